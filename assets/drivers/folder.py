@@ -22,20 +22,20 @@ import time
 from handeye_driver import Fault, conjugate, parser, pose, quaternion, serve, size, times, turned, within
 
 ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
-# Endings of a pose beside its image, in the order in which they are looked for.
+# Suffixes of a pose file next to its image, in the order of the search.
 BESIDE = (".json", ".csv", ".txt")
 DESCRIPTION = "dataset.toml"
-# How often a state is sent [s]: the protocol asks for ten times a second or more.
+# Interval of states [s]: the protocol requires ten per second or more.
 STATE_S = 0.04
-# How often the image is shown again [s]: it is looked at as a camera is, at any time.
+# Interval at which the image is sent again [s]: it is read like a camera, at any time.
 SHOW_S = 0.2
-# How often the folder is looked at [s].
+# Interval at which the folder is read [s].
 LOOK_S = 0.25
-# How long files that are there at the start may take to be read [s]: less than the workbench waits for `hello`.
+# How long reading the initial files may take [s]: less than the workbench waits for `hello`.
 FIRST_S = 6.0
-# A file that has not changed for so long [s] may be whole, a last line without an end counts after so long.
+# A file that has not changed for this long [s] may be complete; a last line without a newline counts after this long.
 SETTLE_S, REST_S = 0.4, 1.0
-# What is still missing after so long [s] is named.
+# What is still missing after this long [s] is reported.
 COMPLAIN_S = 3.0
 # The protocol takes no more bytes of an image; a pose and a table of poses are shorter.
 MOST_IMAGE, MOST_POSE, MOST_TABLE = 64 << 20, 1 << 20, 16 << 20
@@ -55,7 +55,7 @@ ROTATIONS = {
 UNIT_TOLERANCE = 1e-3
 # How far the product of a matrix with its transpose may be from 1.
 ORTHONORMAL_TOLERANCE = 2 * UNIT_TOLERANCE
-# Joints turn up to two full turns either way.
+# Joints rotate by up to two full turns in either direction.
 LARGEST_ANGLE_RAD = 4 * math.pi
 MOST_JOINTS = 12
 
@@ -156,7 +156,7 @@ def quaternion_of_matrix(m):
     off = max(abs(gram[i][j] - (i == j)) for i in range(3) for j in range(3))
     if not off <= ORTHONORMAL_TOLERANCE:
         raise Wrong(f"r11…r33 is not a rotation matrix: its columns are off orthonormal by {off:.6f}")
-    # Each pass squares what is missing from the polar factor: 1e-3, 1e-6, 1e-12.
+    # Each pass squares the distance to the polar factor: 1e-3, 1e-6, 1e-12.
     for _ in range(3):
         gram = product([list(row) for row in zip(*m)], m)
         m = product(m, [[1.5 * (i == j) - 0.5 * gram[i][j] for j in range(3)] for i in range(3)])
@@ -311,7 +311,7 @@ class Watch:
     def __init__(self, folder, form):
         self.folder, self.form = folder, form
         self.table = Table(os.path.join(folder, form.table), form) if form else None
-        self.waiting = {}  # name: stamp, since when it has not changed [s], and whether it was found to be no image since
+        self.waiting = {}  # name: stamp, since when it has not changed [s], and whether it was found not to be an image since
         self.taken = set()
         self.rows_since = {}
         self.logged = set()
@@ -435,7 +435,7 @@ class Folder:
         while True:
             found += self.watch.look(outlet.own_time())
             looks += 1
-            # What the first look has found is settled by the third.
+            # What the first scan has found is settled by the third.
             is_read = looks > 2 and (found or not self.watch.waiting)
             if is_read or outlet.own_time() - start_s > FIRST_S:
                 return max(found, key=lambda capture: capture.modified, default=None)

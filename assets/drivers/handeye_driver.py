@@ -24,7 +24,7 @@ import traceback
 PROTOCOL = 1
 VERSION = "1.0"
 LONGEST_LINE = 65_536
-# A driver that reads nothing for so long [s] was started by a person, who has to know what it waits for.
+# A driver that reads nothing for this long [s] was started by a user, who has to know what it waits for.
 LONELY_S = 1.0
 WAITING = (
     "this program is a driver and waits for `hello` on its standard input, which the workbench sends that starts it: name this "
@@ -45,16 +45,16 @@ class DeviceClock:
 
     # How long a message counts [s]: two clocks that drift apart by 1 part in 10 000 stay within 3 ms.
     WINDOW_S = 30.0
-    # One value is kept for so long [s].
+    # One value is kept for this long [s].
     BUCKET_S = 1.0
-    # How fast what is shown follows what is known [s/s]. Faster than 1e-4, the workbench would take it for a clock that was set.
+    # How fast the shown clock follows the estimate [s/s]. Faster than 1e-4, the workbench would take it for a clock that was set.
     SLEW = 5e-5
-    # What is farther off [s] is shown at once: the clock was set, or the first messages were very late.
+    # A larger difference [s] is shown at once: the clock was set, or the first messages were very late.
     STEP_S = 0.05
 
     def __init__(self):
         self.buckets = collections.deque()  # [begin, least of arrival - stamp], oldest first
-        self.shown = None  # when it was last asked, and by how much the own clock was shown to lead
+        self.shown = None  # when it was last read, and by how much the own clock was shown to lead
 
     def heard(self, arrival_s, stamp_s):
         lead = arrival_s - stamp_s
@@ -112,7 +112,7 @@ class Outlet:
                 self.output.write(line)
                 self.output.write(data)
                 self.output.flush()
-            except OSError:  # nobody reads any more
+            except OSError:  # the reader is gone
                 self.ended.set()
 
     def state(self, stamp, **fields):
@@ -217,7 +217,7 @@ def hear(line, device, outlet):
 
 def serve(device):
     """Speaks for a device until the workbench says `bye` or closes its end, and then ends the program."""
-    # Standard output is for messages alone: what libraries print goes to standard error, and so to the window's log.
+    # Standard output is for messages only: output of libraries goes to standard error, and so to the window's log.
     messages = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     outlet = Outlet(messages)
@@ -239,7 +239,7 @@ def parser(documentation):
     paragraphs = documentation.strip("\n").split("\n\n")
     examples = [textwrap.indent(textwrap.dedent(part), "  ") for part in paragraphs if part.startswith("    ")]
     words = [textwrap.fill(part, width) for part in paragraphs if not part.startswith("    ")]
-    name = os.environ.get("HANDEYE_DRIVER")  # where the workbench's program starts it
+    name = os.environ.get("HANDEYE_DRIVER")  # set if the workbench's program starts it
     options = argparse.ArgumentParser(
         prog=name,
         description="\n\n".join(words),
@@ -248,10 +248,10 @@ def parser(documentation):
         allow_abbrev=False,
     )
     if name:
-        # That program takes them out of the options.
+        # That program removes them from the options.
         help = "the Python to run this with, which has its packages, in place of an environment that is made once"
         options.add_argument("--python", metavar="PATH", help=help)
-        options.add_argument("-q", "--quiet", action="store_true", help="say nothing but results and errors")
+        options.add_argument("-q", "--quiet", action="store_true", help="print results and errors only")
     return options
 
 

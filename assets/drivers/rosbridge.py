@@ -30,31 +30,31 @@ PORT = 9090
 TF, TF_STATIC = "/tf", "/tf_static"
 # How long a connection may take [s].
 PATIENCE_S = 4
-# How often rosbridge is asked whether it is still there, and after how long without an answer it is not [s].
+# Interval at which rosbridge is pinged, and the time without an answer after which it counts as gone [s].
 PING_S, SILENCE_S = 2, 4
 # Longest message in bytes: an image of 4k in base64, and room to spare.
 MOST_BYTES = 64 << 20
-# How long topics may take to say something for the first time [s]: less than the workbench waits for `hello`.
+# How long the first messages of topics may take [s]: less than the workbench waits for `hello`.
 FIRST_S = 7.0
 # How long frames are collected before they are listed for the user [s].
 LISTING_S = 3.0
-# How often a topic that nobody publishes yet is asked for again [s].
+# Interval at which a topic without a publisher is subscribed to again [s].
 AGAIN_S = 2.0
-# How long at most until it is asked whether the workbench has gone, and between states of an arm that does not move [s].
+# Longest time between checks whether the workbench is gone, and between states of an arm at rest [s].
 TICK_S = 0.05
 # States are no closer than this [s]: 500 a second.
 CLOSEST_S = 0.002
 # A clock that goes back by more than this [s] was set.
 RESET_S = 1.0
-# So long without a new pose [s] is worth a line in the log.
+# This long without a new pose [s] is worth a line in the log.
 STALE_S = 2.0
 # Image and depth image of one exposure have stamps no further apart [s].
 ONE_INSTANT_S = 0.005
 # How far the norm of a quaternion of tf may be from 1: rounding to three digits is within, zeros of a field never set are not.
 UNIT_TOLERANCE = 1e-3
-# What strangers send is bounded: frames, links of a chain, values of a stream, pieces of messages, sides of an image.
+# Bounds on untrusted input: frames, links of a chain, values of a stream, pieces of messages, sides of an image.
 MOST_FRAMES, LONGEST_CHAIN, MOST_SAMPLES, MOST_PIECES, MOST_SIDE = 2000, 200, 512, 65_536, 16_384
-# Types of messages that are read, by their ends.
+# Types of messages that are read, by their suffixes.
 READ = ("/Image", "/CompressedImage", "/CameraInfo", "/JointState", "/TFMessage")
 
 
@@ -398,7 +398,7 @@ class Bridge:
             "rosbridge_websocket.launch`)"
         )
         host, port = address(self.url)
-        # The library tries again and again, and does not say why it fails.
+        # The library keeps retrying, and does not report why it fails.
         try:
             socket.create_connection((host, port), PATIENCE_S).close()
         except OSError as error:
@@ -409,7 +409,7 @@ class Bridge:
             maxMessagePayloadSize=MOST_BYTES,
             autoPingInterval=PING_S,
             autoPingTimeout=SILENCE_S,
-            utf8validateIncoming=False,  # reading the JSON does that, and faster
+            utf8validateIncoming=False,  # parsing the JSON does that, and faster
         )
         self.ros.factory.on_ready(self.listen)
         self.ros.on("close", lambda _: self.incoming.put(("close", "rosbridge closed the connection")))
@@ -420,7 +420,7 @@ class Bridge:
 
     def listen(self, protocol):
         protocol.register_message_handlers("fragment", lambda message: self.piece(protocol, message))
-        # The library has no other way to hear what rosbridge says about subscriptions.
+        # The library has no other way to receive rosbridge's messages about subscriptions.
         protocol._message_handlers["status"] = lambda message: self.incoming.put(("status", message))
 
     def send(self, message):
@@ -486,7 +486,7 @@ class Rosbridge:
         self.tree = Tree()
         self.joints = Joints([joint["name"] for joint in arm_joints])
         self.frames = (options.base_frame, options.tip_frame) if options.base_frame else None
-        self.heard = set()  # topics on which something came
+        self.heard = set()  # topics that have sent something
         self.topics, self.complaints, self.remarks = [], [], set()
         self.info, self.size, self.lens = None, None, None
         # Images and depth images that wait for the other.
@@ -497,7 +497,7 @@ class Rosbridge:
         """Topics, with the least time between two messages [ms] and the length of rosbridge's queue. tf is bounded by its queue
         alone: leaving out messages of one publisher leaves out another's links."""
         options = self.options
-        # Image and depth, each thinned by itself, would never be of one instant.
+        # Image and depth, each throttled separately, would never be from one instant.
         throttle_ms = 0 if options.depth else 1000 // options.image_rate
         asked = [(TF, 0, 100), (TF_STATIC, 0, 100), (options.joints, 0, 100), (options.image, throttle_ms, 1)]
         asked += [(options.depth, throttle_ms, 1), (options.camera_info, 1000, 1)]
@@ -710,7 +710,7 @@ class Rosbridge:
         if stamp is None:
             stamp = limit
             if stamp == math.inf:
-                # Nothing moves and nothing is stamped: it is there now.
+                # Nothing moves and nothing is stamped: it is valid now.
                 if now - self.sent_s < TICK_S:
                     return
                 stamp = outlet.device_time()

@@ -6,8 +6,8 @@ The robot and the camera are made up: replace `read_robot`, `step` and `read_cam
 """
 import json, math, os, sys, threading, time
 
-messages = os.fdopen(os.dup(1), "wb")  # standard output is for messages alone:
-os.dup2(2, 1)  # what libraries print goes to standard error, and so to the window's log
+messages = os.fdopen(os.dup(1), "wb")  # standard output is for messages only:
+os.dup2(2, 1)  # output of libraries goes to standard error, and so to the window's log
 lock = threading.RLock()
 JOINTS = [{"name": f"joint {i + 1}", "kind": "revolute", "min": -math.pi, "max": math.pi} for i in range(6)]
 WIDTH, HEIGHT = 640, 480

@@ -16,7 +16,7 @@ import time
 from handeye_driver import Fault, parser, pose, quaternion, serve, within
 
 PORT = 30004
-# As Universal Robots' own description names them.
+# As named in Universal Robots' own description.
 JOINTS = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"]
 # The robots whose chains the workbench has.
 ARMS = ["ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e", "ur16e", "ur5_coppeliasim"]
@@ -31,11 +31,11 @@ SAFETY_MODES = {
 }  # fmt: skip
 # From this mode on the encoders of the joints are read.
 POWER_ON = 4
-# Slower than this an arm stands still [m/s, rad/s]. What is measured at rest is noise of about a tenth of it.
+# Slower than this an arm is at rest [m/s, rad/s]. The noise measured at rest is about a tenth of it.
 REST_M_S, REST_RAD_S = 2e-3, 1e-2
 # How long a connection or the next values may take [s].
 PATIENCE_S = 2.0
-# So many values tell how fast they arrive at best: 0.2 s of them.
+# Number of values that determine how fast they arrive at best: 0.2 s of them.
 FOR_THE_CLOCK = 25
 
 
@@ -49,7 +49,7 @@ class UrRtde:
 
     def open(self, outlet):
         host = self.options.host
-        # The library waits for minutes where nothing answers.
+        # The library waits for minutes if nothing answers.
         try:
             socket.create_connection((host, PORT), PATIENCE_S).close()
         except OSError as error:
@@ -108,7 +108,7 @@ class UrRtde:
             if values["modes"] != self.modes:
                 self.modes = values["modes"]
                 log_modes(outlet, *self.modes)
-            # Switched off, the controller repeats what it last knew, or zeros.
+            # When switched off, the controller repeats its last values, or zeros.
             if values["modes"][0] >= POWER_ON:
                 tip = values["tip"]
                 outlet.state(
@@ -146,7 +146,7 @@ def main():
     options.add_argument(
         "--frequency", metavar="HZ", type=within(10, 500, int), default=125, help="states a second: up to 125 from a CB3, up to 500 from an e-Series"
     )
-    arms = f"which arm it is, which the controller does not say: {', '.join(ARMS)}"
+    arms = f"which arm it is, which the controller does not report: {', '.join(ARMS)}"
     options.add_argument("--arm", metavar="NAME", choices=ARMS, help=arms)
     serve(UrRtde(options.parse_args()))
 

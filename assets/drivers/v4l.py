@@ -15,17 +15,17 @@ import os
 
 from handeye_driver import Fault, parser, serve, size, within
 
-# Formats that are read, the ones first that lose least, JPEG blurs the edges that corners are found at; and how they are sent.
-# What has colours OpenCV hands out as blue, green, red.
+# Formats that are read, the least lossy ones first, since JPEG blurs the edges of corners; and how they are sent.
+# OpenCV returns colours as blue, green, red.
 FORMATS = {"RGB3": "bgr8", "YUYV": "bgr8", "GREY": "mono8", "MJPG": "jpeg"}
 # Larger than any: the kernel takes the nearest that the camera has.
 LARGEST = (16_384, 16_384)
-# Longest wait for a frame [s]: a camera that has to adapt to the dark takes its time with the first.
+# Longest wait for a frame [s]: a camera that has to adapt to the dark is slow with the first.
 PATIENCE_S = 5
-# Taken for the time between two frames [s] where the device does not say it: longer than that of any usual camera, so that
-# what is stated of stamps is not too little.
+# Assumed time between two frames [s] if the device does not report it: longer than that of any usual camera, so that the
+# stated uncertainty of stamps is not too small.
 SLOW_S = 0.1
-# Frames in a row that are not whole before the driver gives up.
+# Consecutive incomplete frames before the driver gives up.
 MOST_BROKEN = 100
 
 
@@ -77,7 +77,7 @@ class V4l:
             taken = "".join(chr(code >> shift & 0xFF) for shift in (0, 8, 16, 24))
             found = (int(camera.get(cv2.CAP_PROP_FRAME_WIDTH)), int(camera.get(cv2.CAP_PROP_FRAME_HEIGHT)))
             if taken == name and (self.options.size is None or found == self.options.size):
-                # A JPEG stays as it is, and grey is not turned into colours.
+                # A JPEG is kept as it is, and grey is not converted to colour.
                 camera.set(cv2.CAP_PROP_CONVERT_RGB, FORMATS[name] == "bgr8")
                 self.encoding, self.size = FORMATS[name], found
                 return name
@@ -128,7 +128,7 @@ def bytes_of(frame, encoding, image_size):
     width, height = image_size
     data = frame.tobytes()
     if encoding == "jpeg":
-        # What is cut off on its way over USB has no end; some cameras fill up the buffer behind it.
+        # A frame that is truncated in the USB transfer has no end marker; some cameras fill up the buffer after it.
         end = data.rfind(b"\xff\xd9")
         if not data.startswith(b"\xff\xd8") or end < 0:
             raise ValueError(f"a frame of {len(data)} bytes is no whole JPEG")

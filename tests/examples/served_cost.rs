@@ -1,6 +1,5 @@
-//! What the workbench in a browser costs: bytes, processor time and delay, beside the desktop window on a screen without a
-//! graphics card. A page here is a program that says at
-//! once that a frame is shown; ten more watch.
+//! What the workbench in a browser costs: bytes, processor time and delay, compared with the desktop window on a screen
+//! without a graphics card. A page here is a program that reports at once that a frame is shown; ten more watch.
 //!
 //! `cargo run --release -p handeye_tests --example served_cost`
 
@@ -22,7 +21,7 @@ use tungstenite::{Message, WebSocket};
 /// How long each is measured.
 const LONG: Duration = Duration::from_secs(15);
 
-/// Clock ticks of a second, in which the system counts processor time.
+/// Clock ticks per second, in which the system counts processor time.
 const TICKS: f64 = 100.0;
 
 struct Ends(Child);
@@ -40,7 +39,7 @@ fn processor_s(id: u32) -> f64 {
     rest.split_whitespace().skip(11).take(2).filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>() / TICKS
 }
 
-/// The binary; an example stands in a folder beside it.
+/// The binary; an example is in a folder next to it.
 fn binary() -> PathBuf {
     let binary = handeye_tests::handeye_binary();
     if binary.is_file() { binary } else { binary.with_file_name("../handeye") }
@@ -78,7 +77,7 @@ impl Page {
         Ok(self.socket.send(Message::text(reported.to_string()))?)
     }
 
-    /// Waits for a frame and says that it is shown; whether it brought a live image.
+    /// Waits for a frame and reports that it is shown; returns whether it brought a live image.
     fn frame(&mut self) -> anyhow::Result<bool> {
         loop {
             let message = self.socket.read()?;
@@ -139,7 +138,7 @@ fn main() -> anyhow::Result<()> {
     }
     let one = page.measure("one page", id)?;
 
-    // The pointer goes on and off a button. A frame that was on its way already counts, so that this is the least.
+    // The pointer moves on and off a button. A frame that was in flight already counts, so that this is a lower bound.
     let mut delays = Vec::new();
     for turn in 0..60 {
         let at = if turn % 2 == 0 { [90.0, 140.0] } else { [700.0, 25.0] };

@@ -1,5 +1,5 @@
-//! What `handeye serve` holds over a long time: it tracks the board of the built-in cell and records, while a page shows all of
-//! it. Prints threads, memory and frames once a minute; what it grows by after the first five minutes is the figure.
+//! Resource use of `handeye serve` over a long time: it tracks the board of the built-in cell and records, while a page shows
+//! all of it. Prints threads, memory and frames once a minute; the growth after the first five minutes is the result.
 //!
 //! `cargo run --release -p handeye_tests --example soak [MINUTES]`; 30 if not given.
 
@@ -15,7 +15,7 @@ use tungstenite::client::IntoClientRequest as _;
 use tungstenite::http::HeaderValue;
 use tungstenite::{Message, WebSocket};
 
-/// Until what is made once is there, and what is kept for a while is full.
+/// Until one-time allocations are done, and limited buffers are full.
 const FIRST: Duration = Duration::from_mins(5);
 
 /// Longest wait for a control.
@@ -29,13 +29,13 @@ impl Drop for Ends {
     }
 }
 
-/// The binary; an example stands in a folder beside it.
+/// The binary; an example is in a folder next to it.
 fn binary() -> PathBuf {
     let binary = handeye_tests::handeye_binary();
     if binary.is_file() { binary } else { binary.with_file_name("../handeye") }
 }
 
-/// The page of a person: shows every frame, and presses what has a name.
+/// A user's page: shows every frame, and presses controls by name.
 struct Page {
     socket: WebSocket<TcpStream>,
     controls: Vec<Value>,
@@ -77,7 +77,7 @@ impl Page {
         }
     }
 
-    /// Presses a button, once it is there and can be pressed.
+    /// Presses a button, once it exists and can be pressed.
     fn press(&mut self, label: &str) -> anyhow::Result<()> {
         let began = Instant::now();
         loop {
@@ -131,7 +131,7 @@ fn main() -> anyhow::Result<()> {
     page.press("Start tracking")?;
     page.press("Stop tracking").context("it does not track")?;
     page.press("Start tracking")?;
-    // What is told to a screen reader is not what a page usually is sent.
+    // What is sent for screen readers is not usually sent to a page.
     page.say(&json!({"t": "reads", "reads": false}))?;
 
     println!("{:>7} {:>8} {:>7} {:>8}", "minutes", "threads", "MB", "frames");

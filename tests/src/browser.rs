@@ -1,5 +1,4 @@
-//! A real browser (Chromium without a screen), told what to do over its DevTools protocol: pages, mouse, fingers, keys and
-//! images.
+//! A real browser (headless Chromium), controlled over its DevTools protocol: pages, mouse, fingers, keys and images.
 
 use std::cell::RefCell;
 use std::io::{BufRead as _, BufReader, Read as _};
@@ -25,7 +24,7 @@ pub struct Browser {
 struct DevTools {
     socket: WebSocket<TcpStream>,
     calls: u64,
-    /// What the pages said to their consoles.
+    /// What the pages wrote to their consoles.
     reported: Vec<String>,
 }
 
@@ -47,7 +46,7 @@ impl Browser {
             .args(["--headless=new", "--no-sandbox", "--no-first-run", "--disable-quic", "--remote-debugging-port=0"])
             .args(["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"])
             .args(["--disable-background-networking", "--disable-component-update", "--disable-sync"])
-            // A page that nobody sees on this machine is one that somebody uses.
+            // A page that is not visible on this machine may be in use.
             .args(["--disable-background-timer-throttling", "--disable-renderer-backgrounding"])
             .args(["--disable-backgrounding-occluded-windows"])
             .args(["--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1"])
@@ -102,7 +101,7 @@ impl Browser {
         self.call(None, "Target.closeTarget", &json!({"targetId": tab.target}));
     }
 
-    /// What an expression is in a page; a promise is waited for.
+    /// The value of an expression in a page; a promise is awaited.
     ///
     /// # Panics
     /// When it throws.
@@ -133,7 +132,7 @@ impl Browser {
         assert_eq!(self.evaluate(tab, &waits), Value::Bool(true), "waiting for {expression}");
     }
 
-    /// Presses the mouse and lets it go.
+    /// Presses and releases the mouse.
     pub fn click(&self, tab: &Tab, place: (f64, f64)) {
         self.point(tab, place);
         self.mouse(tab, "mousePressed", place);
@@ -146,7 +145,7 @@ impl Browser {
         self.mouse(tab, "mousePressed", place);
     }
 
-    /// Lets the mouse go.
+    /// Releases the mouse.
     pub fn let_go(&self, tab: &Tab, place: (f64, f64)) {
         self.mouse(tab, "mouseReleased", place);
     }
@@ -217,7 +216,7 @@ impl Browser {
         data_encoding::BASE64.decode(base64.as_bytes()).expect("base 64")
     }
 
-    /// What pages have said to their consoles, warnings and errors among it.
+    /// What pages have written to their consoles, including warnings and errors.
     pub fn text(&self) -> Vec<String> {
         self.devtools.borrow().reported.clone()
     }
@@ -231,13 +230,13 @@ impl Browser {
         }
     }
 
-    /// Freezes a page, as a browser does when it is put aside or the lid is closed, or lets it go on.
+    /// Freezes a page, as a browser does when it is in the background or the lid is closed, or resumes it.
     pub fn freeze(&self, tab: &Tab, is_frozen: bool) {
         let state = if is_frozen { "frozen" } else { "active" };
         self.call(Some(tab), "Page.setWebLifecycleState", &json!({"state": state}));
     }
 
-    /// Stops all its processes where they are, or lets them go on.
+    /// Stops all its processes where they are, or resumes them.
     ///
     /// # Panics
     /// When there are none.

@@ -1,8 +1,8 @@
 //! A stand-in for CoppeliaSim with an empty scene, for a program that builds one over the remote API: the built-in cell
-//! answers what it serves, a record of CoppeliaSim 4.10's API the rest, and every call is written down.
+//! answers what it supports, a record of CoppeliaSim 4.10's API the rest, and every call is recorded.
 //!
-//! Each object that the program makes is a frame of the cell, so that paths and poses are the cell's. What the cell cannot
-//! have (colours, ranges of joints, a file) is in the calls alone.
+//! Each object that the program creates is a frame of the cell, so that paths and poses are the cell's. What the cell does
+//! not support (colours, ranges of joints, a file) is in the calls only.
 
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -14,9 +14,9 @@ use handeye_wire::{self as wire, Reader as _};
 
 use crate::CellProcess;
 
-/// Longest wait for a program that builds a scene. Only a failure takes so long.
+/// Longest wait for a program that builds a scene. Only a failure takes this long.
 const PATIENCE: Duration = Duration::from_mins(2);
-/// How often it is asked whether the program has ended \[ms\].
+/// How often it is checked whether the program has ended \[ms\].
 const LOOK_MS: i64 = 50;
 
 /// Constants that the cell does not list, with CoppeliaSim 4.10's numbers.
@@ -31,9 +31,9 @@ const RESOURCES: i64 = 141;
 /// `sim.sceneobject_script`.
 const SCRIPT: i64 = 17;
 
-/// Functions that make an object, with the alias that it has then.
+/// Functions that create an object, with its initial alias.
 const MAKERS: [(&str, &str); 2] = [("createVisionSensor", "visionSensor"), ("createPrimitiveShape", "Plane")];
-/// Functions that give nothing back.
+/// Functions that return nothing.
 const SETTERS: [&str; 5] = ["setJointInterval", "setJointMode", "setObjectInt32Param", "setShapeColor", "saveScene"];
 
 /// A call that the program made.
@@ -42,7 +42,7 @@ pub struct Call {
     /// The function, with its namespace.
     pub function: String,
     pub args: Vec<Value>,
-    /// What it was given.
+    /// The returned values.
     pub returned: Vec<Value>,
 }
 
@@ -60,7 +60,7 @@ pub struct StandIn {
 }
 
 impl StandIn {
-    /// In front of a cell, whose arm is the one that can be loaded. What else the program may make is renamed.
+    /// Connected to a cell, whose arm is the one that can be loaded. What else the program may create is renamed.
     ///
     /// # Panics
     /// When the cell is not one with a UR5.
@@ -85,7 +85,8 @@ impl StandIn {
         Self { cell, calls: Vec::new(), served, forwarded, port, arm, script, _process: process }
     }
 
-    /// Empties the scene: nothing has the name of something that a program makes, and the arm stands as its model does.
+    /// Empties the scene: nothing has the name of something that a program creates, and the arm has its model's initial
+    /// pose.
     ///
     /// # Panics
     /// When the cell refuses.
@@ -138,7 +139,7 @@ impl StandIn {
         ask(&mut self.cell, function, args).expect("the cell answers")
     }
 
-    /// Runs a program that talks to it.
+    /// Runs a program that connects to it.
     ///
     /// # Panics
     /// When the program does not run or does not end, or the cell does not answer.
@@ -160,7 +161,7 @@ impl StandIn {
         child.wait_with_output().expect("its words")
     }
 
-    /// Answers one request; whether there was one.
+    /// Answers one request; returns whether there was one.
     fn serve(&mut self) -> anyhow::Result<bool> {
         if self.served.poll(zmq::POLLIN, LOOK_MS)? == 0 {
             return Ok(false);
@@ -189,7 +190,7 @@ impl StandIn {
         Ok(reply)
     }
 
-    /// What CoppeliaSim gives back where the cell does not serve the call.
+    /// CoppeliaSim's return values if the cell does not support the call.
     fn recorded(&mut self, function: &str, args: &[Value]) -> anyhow::Result<Option<Vec<Value>>> {
         let Some(name) = function.strip_prefix("sim.") else { return Ok(None) };
         let asks_for = |at: usize, value| args.get(at).and_then(Value::integer) == Some(value);

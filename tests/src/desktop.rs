@@ -1,5 +1,5 @@
-//! The window as a person has it before him: on a screen of its own (Xvfb), pressed by a real mouse and keyboard (xdotool),
-//! or in a browser, pressed by its events.
+//! The window as the user sees it: on a screen of its own (Xvfb), operated with a real mouse and keyboard (xdotool), or in
+//! a browser, operated through its events.
 
 use std::borrow::Cow;
 use std::net::SocketAddr;
@@ -13,9 +13,9 @@ use crate::browser::{Browser, Tab};
 use crate::process;
 use crate::watch::Watch;
 
-/// Longest wait for something to show.
+/// Longest wait for something to appear.
 const PATIENCE: Duration = Duration::from_mins(10);
-/// Longest time without a change of the controls after which a look at the window itself is due.
+/// Longest time without a change of the controls before the window itself is checked.
 const LOOK: Duration = Duration::from_secs(1);
 /// The list of widgets is written, closed and renamed for every frame.
 const CHANGES_OF_A_FRAME: usize = 3;
@@ -59,12 +59,12 @@ struct Node<'a> {
     enabled: bool,
 }
 
-/// Whether the programs are there that a [`Desktop`] needs; where one is not, the running test has said that it skips.
+/// Whether the programs that a [`Desktop`] needs are installed; if not, the running test has reported that it skips.
 pub fn is_possible() -> bool {
     programs(Need::Xvfb, &["Xvfb", "xdotool", "import"])
 }
 
-/// Whether the browser is there that a [`Desktop::in_browser`] needs; where it is not, the running test has said that it
+/// Whether the browser that a [`Desktop::in_browser`] needs is installed; if not, the running test has reported that it
 /// skips.
 pub fn is_possible_in_browser() -> bool {
     programs(Need::Chromium, &["chromium"])
@@ -92,7 +92,7 @@ impl Desktop {
     pub fn start(size: (u32, u32), shots: &Path, arguments: &[&str], environment: &[(&str, &str)]) -> Self {
         let (width, height) = size;
         let home = tempfile::tempdir().expect("a folder");
-        // The screen chooses a free number and says which.
+        // The screen chooses a free number and reports it.
         let mut screen = Command::new("Xvfb")
             .args(["-displayfd", "1", "-screen", "0", &format!("{width}x{height}x24"), "-nolisten", "tcp"])
             .stdout(Stdio::piped())
@@ -125,7 +125,7 @@ impl Desktop {
         Self::in_browser_over(size, touch, shots, arguments, |address| address)
     }
 
-    /// The same, of which the browser sees another address: that of what lies between the two.
+    /// The same, with a different address for the browser: that of a network in between.
     ///
     /// # Panics
     /// When one of them does not start.
@@ -152,7 +152,7 @@ impl Desktop {
         let address = through(address.parse().expect("an address"));
         let browser = Browser::start();
         let tab = browser.open(&format!("http://{address}/"), size, touch);
-        // What is pressed before there is a frame is pressed beside it.
+        // A press before there is a frame hits nothing.
         browser.until(&tab, &format!("show.frame?.size[0] === {}", size.0));
         std::fs::create_dir_all(shots).expect("a folder");
         let widgets = home.path().join("widgets");
@@ -222,10 +222,10 @@ impl Desktop {
         found.map(|widget| widget.label).unwrap_or_default()
     }
 
-    /// Waits until the label that begins with a text is another one than before.
+    /// Waits until the label that begins with a text has changed.
     ///
     /// # Panics
-    /// When it stays as it is.
+    /// When it does not change.
     pub fn until_other(&mut self, start: &str, before: &str) {
         let is_other = |widget: &Widget| widget.label.starts_with(start) && widget.label != before;
         self.until(&format!("another {before:?}"), |widgets| widgets.iter().any(is_other));
@@ -235,7 +235,7 @@ impl Desktop {
         let deadline = Instant::now() + PATIENCE;
         let mut looked_at = None;
         loop {
-            // Most changes of files are those of a list that says the same.
+            // Most changes of files are those of an unchanged list.
             let list = self.list();
             if looked_at.as_ref() != Some(&list) {
                 if is_so(&Self::parse(&list)) {
@@ -256,7 +256,7 @@ impl Desktop {
         }
     }
 
-    /// Clicks the button whose label is, or begins with, a text, once it stands still.
+    /// Clicks the button whose label is, or begins with, a text, once it has stopped moving.
     ///
     /// # Panics
     /// When there is none that can be pressed.
@@ -290,7 +290,7 @@ impl Desktop {
         }
     }
 
-    /// Where the middle of a button is that can be pressed; waits for it.
+    /// The centre of a button that can be pressed; waits for it.
     ///
     /// # Panics
     /// When it does not come.
@@ -325,14 +325,14 @@ impl Desktop {
         (status, asked.elapsed())
     }
 
-    /// An image of the screen, `NAME.png`, and where it is; the pointer is moved out of the way first, and what it opened closes.
+    /// An image of the screen, `NAME.png`, and where it is; the pointer is moved out of the way first, and its tooltip closes.
     pub fn photograph(&self, name: &str) -> PathBuf {
         match &self.surface {
             Surface::Screen { display, .. } => xdotool(display, &["mousemove", "700", "12"]),
             Surface::Page { browser, tab, touch: false } => browser.point(tab, (700.0, 12.0)),
             Surface::Page { .. } => {}
         }
-        // The window is drawn again without what the pointer was over, then without what hung there. The list of widgets is
+        // The window is drawn again without what the pointer was over, then without its tooltip. The list of widgets is
         // written before its frame is on the screen, so that one more has to begin.
         self.frame_drawn();
         self.frame_drawn();

@@ -1,4 +1,4 @@
-//! What programs send to a cell that mean it no good.
+//! What malicious programs send to a cell.
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
@@ -36,10 +36,10 @@ pub fn body_after(http_head: &[u8], request: &[u8], bytes: usize) -> Vec<u8> {
     body
 }
 
-/// Does what a ZeroMQ socket does first, and hears the same of the other side.
+/// Performs the handshake of a ZeroMQ socket, and receives the peer's.
 ///
 /// # Panics
-/// When there is no such socket on the other side.
+/// When the peer is not such a socket.
 pub fn introduce(stream: &mut TcpStream) {
     let mut greeting = [0_u8; 64];
     greeting[0] = 0xff;
@@ -48,7 +48,7 @@ pub fn introduce(stream: &mut TcpStream) {
     greeting[12..16].copy_from_slice(b"NULL");
     stream.write_all(&greeting).expect("sent");
     stream.write_all(b"\x04\x1c\x05READY\x0bSocket-Type\x00\x00\x00\x06DEALER").expect("sent");
-    // Greeting, then the length of its introduction, which is a short one.
+    // Greeting, then the length of its handshake, which is short.
     let mut theirs = [0; 66];
     stream.read_exact(&mut theirs).expect("a greeting");
     stream.read_exact(&mut vec![0; usize::from(theirs[65])]).expect("an introduction");

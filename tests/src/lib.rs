@@ -20,8 +20,8 @@ pub fn workspace_root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or_else(|| Path::new("."))
 }
 
-/// Makes time pass four times as fast in a cell of which only the outcome counts, in passes of a fifth of a second: every pass that
-/// an arm takes to its goal is an image that is drawn, sent and searched.
+/// Makes time pass four times as fast in a cell if only the outcome counts, in passes of a fifth of a second: every pass that an
+/// arm takes to its goal is an image that is drawn, sent and searched.
 pub fn hurry(scene: &mut Scene) {
     scene.simulation.time_step_s = 0.2;
     scene.simulation.speed_factor = 4.0;
@@ -40,7 +40,7 @@ pub fn hurried(scene: &str, folder: &Path) -> PathBuf {
     file
 }
 
-/// The `handeye` binary beside the running test; `./test` and `cargo test --workspace` build it first.
+/// The `handeye` binary next to the running test; `./test` and `cargo test --workspace` build it first.
 pub fn handeye_binary() -> PathBuf {
     let mut folder = std::env::current_exe().unwrap_or_default();
     folder.pop();
@@ -66,7 +66,7 @@ impl CellProcess {
     /// Starts it on a port (0 for any) and waits for its line.
     ///
     /// # Panics
-    /// When it does not say that it listens.
+    /// When it does not report that it listens.
     pub fn start_on(port: u16, arguments: &[&str]) -> Self {
         let mut child = Command::new(handeye_binary())
             .args(["cell", "--quiet", "--port", &port.to_string()])
@@ -92,7 +92,7 @@ impl CellProcess {
         self.port
     }
 
-    /// Its number among the processes of the system.
+    /// Its process id.
     pub fn id(&self) -> u32 {
         self.child.id()
     }

@@ -1,8 +1,8 @@
-//! A bad network between a program and who talks to it: slow, far, losing packets, and at times gone.
+//! A bad network between a program and its clients: slow, with a long round trip, packet loss, and interruptions.
 //!
-//! TCP hides a lost packet: what came after it waits until it was sent again. So every segment here takes its turn on a
-//! line of limited rate, is under way for half of a round trip, and one that is lost holds up all behind it for as long as
-//! a sender waits before it sends it again: one and a half round trips, and at least the 200 ms of Linux (RFC 6298).
+//! TCP hides a lost packet: later data waits until it was retransmitted. So every segment here is queued on a line of
+//! limited rate, is in flight for half of a round trip, and a lost one delays all later ones for as long as a sender waits
+//! before the retransmission: one and a half round trips, and at least the 200 ms of Linux (RFC 6298).
 
 use std::io::{Read as _, Write as _};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -16,21 +16,21 @@ use rand_chacha::ChaCha8Rng;
 
 /// Most bytes of a segment on Ethernet.
 const SEGMENT: usize = 1460;
-/// Segments that are under way at most, as with a usual buffer of a router.
+/// Limit of segments in flight, as with a usual buffer of a router.
 const UNDER_WAY: usize = 64;
-/// Least time before something lost is sent again.
+/// Minimum time before a retransmission.
 const AGAIN: Duration = Duration::from_millis(200);
 
-/// What a network is like.
+/// The properties of a network.
 #[derive(Debug, Clone, Copy)]
 pub struct Quality {
-    /// Bits in a second, in each direction.
+    /// Bits per second, in each direction.
     pub bits_per_s: f64,
     /// To the other end and back.
     pub round_trip: Duration,
-    /// Part of the segments that is lost.
+    /// Share of the segments that are lost.
     pub loss: f64,
-    /// Of the choice of those.
+    /// Seed of the choice of those.
     pub seed: u64,
 }
 
@@ -42,7 +42,7 @@ pub struct Network {
 
 struct Link {
     quality: Quality,
-    /// Cut through: nothing arrives, and nobody is told.
+    /// Disconnected: nothing arrives, and neither end is notified.
     is_cut: Mutex<bool>,
     mended: Condvar,
     has_ended: AtomicBool,
@@ -88,12 +88,12 @@ impl Network {
         self.address
     }
 
-    /// Nothing arrives any more, without a word to either end.
+    /// Nothing arrives any more, without notice to either end.
     pub fn cut(&self) {
         *self.link.is_cut.lock().unwrap_or_else(PoisonError::into_inner) = true;
     }
 
-    /// All that was under way arrives.
+    /// Everything that was in flight arrives.
     pub fn mend(&self) {
         *self.link.is_cut.lock().unwrap_or_else(PoisonError::into_inner) = false;
         self.link.mended.notify_all();
@@ -104,12 +104,12 @@ impl Drop for Network {
     fn drop(&mut self) {
         self.link.has_ended.store(true, Ordering::Relaxed);
         self.mend();
-        // The one that waits for connections sees it by one more.
+        // The thread that waits for connections notices it with one more.
         let _woken = TcpStream::connect(self.address).is_ok();
     }
 }
 
-/// Carries what one end says to the other, on threads of its own.
+/// Carries the data of one end to the other, on threads of its own.
 fn carry(link: &Arc<Link>, number: u64, from: TcpStream, to: TcpStream) {
     let (sender, receiver) = sync_channel(UNDER_WAY);
     let (sending, delivering) = (Arc::clone(link), Arc::clone(link));

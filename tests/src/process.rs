@@ -5,10 +5,10 @@ use std::process::{Child, ChildStderr, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-/// Longest wait for the end of a process that is to end. Only a failure takes so long.
+/// Longest wait for a process to end. Only a failure takes this long.
 const PATIENCE: Duration = Duration::from_mins(10);
 
-/// Starts `handeye`; with what it says on standard error.
+/// Starts `handeye`; with its standard error.
 ///
 /// # Panics
 /// When it does not run.
@@ -23,10 +23,10 @@ pub fn start(arguments: &[&str]) -> (Child, BufReader<ChildStderr>) {
     (child, stderr)
 }
 
-/// Reads what a process says until something is reported.
+/// Reads a process's output until something is reported.
 ///
 /// # Panics
-/// When it ends before.
+/// When it ends before that.
 pub fn until_message(stderr: &mut BufReader<ChildStderr>, what: &str) {
     let mut all = String::new();
     while !all.contains(what) {
@@ -43,7 +43,7 @@ pub fn signal(process: &Child, name: &str) {
     assert!(sent.is_ok_and(|status| status.success()), "kill -s {name} {}", process.id());
 }
 
-/// Stops a process where it is, as a computer that falls asleep does, and waits until it stands.
+/// Stops a process where it is, as a computer that falls asleep does, and waits until it has stopped.
 ///
 /// # Panics
 /// When it does not.

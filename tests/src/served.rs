@@ -1,4 +1,4 @@
-//! `handeye serve` as a program of its own, and pages that are no browser.
+//! `handeye serve` as a program of its own, and pages that are not browsers.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
@@ -25,7 +25,7 @@ pub struct Served {
 }
 
 impl Served {
-    /// Starts it with these arguments, without settings of anybody.
+    /// Starts it with these arguments, without any user's settings.
     ///
     /// # Panics
     /// When it does not start.
@@ -74,7 +74,7 @@ impl Served {
     /// A page of it, by its name.
     ///
     /// # Panics
-    /// When it is not let in.
+    /// When access is refused.
     pub fn page(&self, name: &str) -> tungstenite::WebSocket<TcpStream> {
         let mut request = format!("ws://{}/socket?page={name}", self.address).into_client_request().expect("a request");
         let origin = HeaderValue::from_str(&format!("http://{}", self.address)).expect("a header");
@@ -84,7 +84,7 @@ impl Served {
         tungstenite::client(request, stream).expect("a page").0
     }
 
-    /// Memory that it holds \[MB\].
+    /// Memory that it uses \[MB\].
     ///
     /// # Panics
     /// When it has ended.
@@ -101,7 +101,7 @@ impl Drop for Served {
     }
 }
 
-/// Reads until a frame has come, and says that it is shown.
+/// Reads until a frame has arrived, and reports that it is shown.
 ///
 /// # Panics
 /// When the connection ends.

@@ -1,4 +1,4 @@
-//! Waiting for files without looking at them again and again.
+//! Waiting for files without polling.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver};
@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use notify::event::{AccessKind, AccessMode, EventKind};
 use notify::{RecommendedWatcher, RecursiveMode, Watcher as _};
 
-/// Hears of every change in a folder.
+/// Receives every change in a folder.
 #[derive(Debug)]
 pub struct Watch {
     events: Receiver<notify::Result<notify::Event>>,
@@ -15,10 +15,10 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Of what happens in a folder from now on.
+    /// Watches a folder from now on.
     ///
     /// # Panics
-    /// When the system cannot say.
+    /// When the system cannot report it.
     pub fn folder(folder: &Path) -> Self {
         let (sender, events) = mpsc::channel();
         let mut watcher = notify::recommended_watcher(sender).expect("the system reports changes of files");
@@ -26,12 +26,12 @@ impl Watch {
         Self { events, _watcher: watcher }
     }
 
-    /// Leaves out what has changed up to now.
+    /// Ignores what has changed so far.
     pub fn forget(&self) {
         while self.events.try_recv().is_ok() {}
     }
 
-    /// Waits for the next change; `false` when nothing changes for so long.
+    /// Waits for the next change; `false` when nothing changes for this long.
     pub fn changes_within(&self, patience: Duration) -> bool {
         self.events.recv_timeout(patience).is_ok()
     }

@@ -1,9 +1,9 @@
-//! Monte-Carlo study of a camera without a robot: whether what is stated of the lens holds, and whether boards are called
-//! bent when they are.
+//! Monte-Carlo study of a camera without a robot: whether the stated uncertainty of the lens holds, and whether boards
+//! are called bent when they are.
 //!
 //!     cargo run --release -p handeye_studies --example camera_alone -- TRIALS [flat]
 //!
-//! Prints Markdown: the tables of `docs/studies/mathematics.md`. Every cell runs so many sessions through `calibrate`:
+//! Prints Markdown: the tables of `docs/studies/mathematics.md`. Every cell runs this many sessions through `calibrate`:
 //! 640×480, f = 581 px, five distortion coefficients, 10×7 corners of 30 mm, 0.5 to 0.8 m away, tilted by 11° to 40°, 0.1 px
 //! per axis; `little tilt` is 3° to 17°. With `flat` only flat boards, for the rate of false alarms.
 
@@ -21,10 +21,10 @@ use rayon::prelude::*;
 
 const COEFFICIENTS: [f64; 5] = [-0.21, 0.12, 0.001, -0.002, -0.02];
 const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.03 };
-/// Of how many standard deviations 95 % of a Gaussian's errors are.
+/// Number of standard deviations that contain 95 % of a Gaussian's errors.
 const HELD: f64 = 1.96;
 
-/// Corner errors by name: their part of the variance that neighbours share, and over how many squares.
+/// Corner errors by name: the share of the variance common to neighbours, and over how many squares.
 const ERRORS: [(&str, Option<SharedErrors>); 3] = [
     ("independent", None),
     ("half shared, 2 squares", Some(SharedErrors { part: 0.5, reach: 2.0 })),

@@ -1,12 +1,12 @@
-//! Whether guided capture touches anything: sessions among random boxes, on three arms, with the camera on the arm and beside
-//! it, judged by points on the surfaces of everything that moves.
+//! Whether guided capture touches anything: sessions among random boxes, on three arms, with the camera on the arm and next
+//! to it (eye to hand), judged by points on the surfaces of everything that moves.
 //!
 //! ```text
 //! cargo run --release -p handeye_studies --example guided_safety -- 2000
 //! ```
 //!
-//! The second row is the same with a lens that has to be found, so that less is known at the beginning. The third one is the
-//! first without the planner knowing of the boxes: what the judgement sees when something is touched.
+//! The second row is the same with a lens that has to be estimated, so that less is known at the beginning. The third one is
+//! the first with boxes unknown to the planner: what the check reports when something is touched.
 
 #![expect(clippy::expect_used, clippy::print_stdout, reason = "a study prints, and stops at what cannot be")]
 

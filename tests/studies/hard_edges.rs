@@ -1,9 +1,9 @@
-//! What images without anti-aliasing cost: corners and calibrations of the scene `coppeliasim`, against its truth.
-//! `cargo run --release --example hard_edges -- [SEEDS] [exact|bitmap] [area]`.
+//! What images without anti-aliasing cost: corners and calibrations of the scene `coppeliasim`, compared with its
+//! truth. `cargo run --release --example hard_edges -- [SEEDS] [exact|bitmap] [area]`.
 //!
-//! Every seed has another camera (1 mm, 0.5°) and another place of the board (2 mm, 0.5°), seen from the ten taught poses. The
-//! truth is the renderer's: pixels are drawn by what their centres see, and corners are where they were printed. `area` draws
-//! the same with pixels that have an area, as the other scenes do.
+//! Every seed has a different camera (1 mm, 0.5°) and a different place of the board (2 mm, 0.5°), seen from the ten taught
+//! poses. The truth is the renderer's: pixels are drawn by what their centres see, and corners are where they were printed.
+//! `area` draws the same with pixels that have an area, as the other scenes do.
 
 use std::path::Path;
 
@@ -85,7 +85,7 @@ fn image(scene: &ResolvedScene, base_from_tip: &Pose<Base, Tip>) -> GrayImage {
     DynamicImage::ImageRgb8(rgb).into_luma8()
 }
 
-/// Errors of corners against where they were printed.
+/// Errors of corners relative to where they were printed.
 #[derive(Default)]
 struct Corners {
     views: usize,
@@ -133,7 +133,7 @@ impl Corners {
     }
 }
 
-/// A calibration against the truth.
+/// A calibration compared with the truth.
 struct Session {
     error_m: f64,
     error_rad: f64,

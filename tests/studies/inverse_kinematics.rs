@@ -2,10 +2,10 @@
 //!
 //!     cargo run --release -p handeye_studies --example inverse_kinematics -- GOALS
 //!
-//! A goal is where the tip is with joint values drawn evenly from their ranges; the search begins at others, drawn alike.
-//! One line for each arm: goals reached to 1e-6 m and rad within the ranges, time of one goal in milliseconds (median, 99th
-//! percentile, longest), and the median of how far the joint that moves most is from where it was, for the answer and for
-//! the values that made the goal.
+//! A goal is where the tip is with joint values drawn evenly from their ranges; the search starts at others, drawn the same
+//! way. One line for each arm: goals reached to 1e-6 m and rad within the ranges, time of one goal in milliseconds (median,
+//! 99th percentile, longest), and the median of the largest joint motion, for the answer and for the values that produced
+//! the goal.
 
 use std::error::Error;
 use std::time::Instant;

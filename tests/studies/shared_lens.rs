@@ -1,11 +1,11 @@
-//! Sessions of one camera by themselves and with a shared lens: errors against the truth, coverage, and how they agree.
+//! Sessions of one camera separately and with a shared lens: errors relative to the truth, coverage, and agreement.
 //!
 //!     cargo run --release -p handeye_studies --example shared_lens -- 100 3 10
 //!
-//! draws so many groups of so many sessions of so many views each (eye in hand, corners 0.1 px, robot 0.1 mm and 0.02°, nine
-//! unknown lens parameters) through the whole path of `calibrate`, and prints Markdown. All sessions of a group have the same
-//! hand-eye transform, of which the estimator knows nothing. A row each for a lens of the model, for one that the model
-//! does not follow (waves of 0.1 px across the image, the same in all), and for a last session with 1 % more focal length.
+//! draws this many groups of this many sessions of this many views each (eye in hand, corners 0.1 px, robot 0.1 mm and 0.02°,
+//! nine unknown lens parameters) through the whole path of `calibrate`, and prints Markdown. All sessions of a group have the
+//! same hand-eye transform, which the estimator does not know. One row each for a lens of the model, for one that the model
+//! does not fit (waves of 0.1 px across the image, the same in all), and for a last session with 1 % more focal length.
 
 use handeye_estimate::diagnose::findings::FindingOptions;
 use handeye_estimate::diagnose::{Calibration, calibrate, examine};
@@ -19,14 +19,14 @@ use rayon::prelude::*;
 
 /// A mild barrel lens, as in the Monte-Carlo study.
 const DISTORTION: Distortion = Distortion::BrownConrady([-0.08, 0.05, 0.0006, -0.0004, -0.01]);
-/// Amplitude of what the lens model does not follow, pixels.
+/// Amplitude of the deviation from the lens model, pixels.
 const WAVE_PX: f64 = 0.1;
 /// Length of its waves, pixels.
 const WAVE_LENGTH_PX: f64 = 300.0;
 /// Focal length of the session that was zoomed over that of the others.
 const ZOOM: f64 = 1.01;
 
-/// What the camera of a row is like.
+/// The camera of a row.
 #[derive(Clone, Copy, PartialEq)]
 enum Lens {
     Model,
@@ -44,14 +44,14 @@ impl Lens {
     }
 }
 
-/// One answer against the truth.
+/// One answer compared with the truth.
 struct Answer {
-    /// Where the reference point is put, less where it is, metres.
+    /// Estimated minus true reference point, metres.
     off_m: nalgebra::Vector3<f64>,
     stated_m: f64,
 }
 
-/// One group, by itself and shared.
+/// One group, separately and shared.
 struct Group {
     own: Vec<Answer>,
     shared: Vec<Answer>,
@@ -71,7 +71,7 @@ fn session(lens: Lens, views: usize, is_last: bool, seed: u64) -> (Session, Obse
     (trial, observations)
 }
 
-/// `None` where nothing is stated.
+/// `None` if nothing is stated.
 fn answer(trial: &Session, calibration: &Calibration) -> Option<Answer> {
     let point = calibration.joint.as_ref()?.reference_point;
     let found = calibration.hand_eye?.mount_from_camera();

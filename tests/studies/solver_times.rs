@@ -2,11 +2,11 @@
 //!
 //!     cargo run --release -p handeye_studies --example solver_times -- FILE REPEATS
 //!
-//! The first line of FILE is `width height columns rows square_m`, every other a view: `base_from_tip` as three metres
-//! and the quaternion `w x y z`, then `u v` of all corners. Prints one JSON object: the camera, its cost in squared
-//! pixels, and the best of so many batches in seconds of processor time: of the intrinsics by a flat board, of the same as
-//! `calibrate` finds them (wrong corners, a bend, what may be stated) and of the whole calibration; and the peak memory in
-//! megabytes, with the intrinsics and with the whole.
+//! The first line of FILE is `width height columns rows square_m`, every other a view: `base_from_tip` as three metres and
+//! the quaternion `w x y z`, then `u v` of all corners. Prints one JSON object: the camera, its cost in squared pixels,
+//! and the best of this many batches in seconds of processor time: of the intrinsics from a flat board, of the same as in
+//! `calibrate` (wrong corners, a bend, what may be stated) and of the whole calibration; and the peak memory in megabytes,
+//! with the intrinsics and with the whole.
 
 use std::error::Error;
 
@@ -51,10 +51,10 @@ fn numbers(line: &str) -> Result<Vec<f64>, std::num::ParseFloatError> {
 
 /// Hertz of the clock that counts processor time in `/proc`.
 const TICKS: f64 = 100.0;
-/// A batch of runs takes so many seconds of processor time, thirty ticks.
+/// A batch of runs takes this many seconds of processor time, thirty ticks.
 const BATCH: f64 = 0.3;
 
-/// Processor time of the process and its peak memory so far, as Linux counts them: seconds and megabytes.
+/// Processor time of the process and its peak memory so far, as counted by Linux: seconds and megabytes.
 fn usage() -> Option<(f64, f64)> {
     let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
     // The name of the program, in brackets, may have spaces in it.
@@ -65,7 +65,7 @@ fn usage() -> Option<(f64, f64)> {
     Some((ticks / TICKS, peak.split_ascii_whitespace().next()?.parse::<f64>().ok()? / 1024.0))
 }
 
-/// The result and the processor time of a run, seconds: the best of so many batches.
+/// The result and the processor time of a run, seconds: the best of this many batches.
 fn timed<T, E: Into<Box<dyn Error>>>(
     repeats: usize,
     work: impl Fn() -> Result<T, E>,
@@ -75,7 +75,7 @@ fn timed<T, E: Into<Box<dyn Error>>>(
     for _ in 0..repeats {
         let (before, mut runs) = (clock()?, 0.0);
         while clock()? < before + BATCH {
-            // What it returns is gone before the next run, so that the peak memory is that of one.
+            // Its result is dropped before the next run, so that the peak memory is that of one.
             work().map_err(Into::into)?;
             runs += 1.0;
         }

@@ -3,8 +3,8 @@
 //!     cargo run --release -p handeye_studies --example two_poses -- SESSIONS
 //!
 //! Prints Markdown: the table of `docs/studies/mathematics.md`. A session has 15 views of 4×3 corners, 15 mm apart, through
-//! 640×480 pixels with f = 581 px, 0.2 px of noise per axis, rolled by up to 60°, by a robot that repeats to 0.1 mm and
-//! 0.02°. Targets are 0.5 m to the stated distance away and tilted by up to the stated angle.
+//! 640×480 pixels with f = 581 px, 0.2 px of noise per axis, rolled by up to 60°, with a robot whose repeatability is 0.1
+//! mm and 0.02°. Targets are 0.5 m to the stated distance away and tilted by up to the stated angle.
 
 use std::process::ExitCode;
 
@@ -26,13 +26,13 @@ const CASES: [SmallTarget; 4] = [
 ];
 const METHODS: [&str; 2] = ["park_martin", "shah"];
 
-/// What one session showed.
+/// The result of one session.
 #[derive(Default)]
 struct Session {
     wrong_poses: usize,
-    /// Views called outliers; none is one.
+    /// Views reported as outliers; none is an outlier.
     outliers: usize,
-    /// Of the closed forms and of the joint estimate, millimetres; infinite where there is none.
+    /// For the closed forms and for the joint estimate, millimetres; infinite if there is none.
     error_mm: [f64; METHODS.len() + 1],
     /// Squared error of the joint estimate in units of its stated covariance, over its six numbers.
     ratio: f64,

@@ -12,15 +12,15 @@ use super::Failure;
 
 /// Configurations at which the chain is compared.
 const VIEWS: usize = 24;
-/// How far each joint is moved from where it stands, in thought, at most: radians, or metres of a prismatic one.
+/// Largest simulated displacement of each joint from its position: radians, or metres of a prismatic one.
 const SPREAD: f64 = 0.7;
-/// How far the chain may put the tip from where the robot reports it, metres and degrees: with a tenth of the free space that the
-/// arm keeps nothing is touched.
+/// How far the chain may put the tip from where the robot reports it, metres and degrees: a tenth of the free space that the arm
+/// keeps, so nothing is touched.
 const MOST_M: f64 = 0.002;
 const MOST_DEG: f64 = 0.5;
 
-/// The chain that was named, put where the robot stands, once it agrees with the poses that the robot reports: nothing is ever
-/// driven by one that does not.
+/// The named chain, with its base at the robot's, once it agrees with the poses that the robot reports: the arm is never moved
+/// with one that does not.
 pub fn checked(named: &str, read: &ArmKinematics, here: &JointValues) -> Result<ArmKinematics, Failure> {
     let arm = named_arm(named)?;
     let need = read.arm().joint_count();
@@ -37,7 +37,7 @@ pub fn checked(named: &str, read: &ArmKinematics, here: &JointValues) -> Result<
     let placed = place(&arm, &views).map_err(Failure::failed)?;
     let worst = |of: fn(&(f64, f64)) -> f64| placed.misses.iter().map(of).fold(0.0, f64::max);
     let (off_m, off_deg) = (worst(|miss| miss.0), worst(|miss| miss.1).to_degrees());
-    // Written so that what is no number is off.
+    // Written so that NaN counts as too far.
     if !(off_m <= MOST_M && off_deg <= MOST_DEG) {
         return Err(Failure::unusable(anyhow::anyhow!(
             "--arm {named} puts the tip up to {:.1} mm and {off_deg:.2}° from where the robot reports it: it is another arm, or \
@@ -48,7 +48,7 @@ pub fn checked(named: &str, read: &ArmKinematics, here: &JointValues) -> Result<
     tracing::info!("the chain of {named} agrees with the robot to {:.2} mm and {off_deg:.3}°", off_m * 1e3);
     let within: Vec<JointRange> = placed.arm.ranges().iter().zip(&ranges).map(|(a, b)| both(a, b)).collect();
     if read.is_ur5() {
-        // Its housings are known, which no other description has.
+        // Its housings are known, unlike for any other description.
         return ArmKinematics::ur5(*read.base_from_arm(), *read.connection_from_tip(), &within)
             .map_err(Failure::unusable);
     }
@@ -75,7 +75,7 @@ fn named_arm(named: &str) -> Result<Arm, Failure> {
     Urdf::read(Path::new(named)).and_then(|urdf| urdf.arm(None, None)).map_err(Failure::unusable)
 }
 
-/// A configuration near where the arm stands, within its ranges; the first one is where it stands.
+/// A configuration near the position of the arm, within its ranges; the first one is the position itself.
 fn about(here: &JointValues, ranges: &[JointRange], view: usize) -> JointValues {
     JointValues::from_fn(here.len(), |joint| {
         // Spread evenly and differently for every joint, by multiples of the golden section.
@@ -85,7 +85,7 @@ fn about(here: &JointValues, ranges: &[JointRange], view: usize) -> JointValues 
     })
 }
 
-/// What two ranges leave.
+/// The intersection of two ranges.
 fn both(a: &JointRange, b: &JointRange) -> JointRange {
     JointRange { min: a.min.max(b.min), max: a.max.min(b.max), speed: a.speed.min(b.speed) }
 }

@@ -3,10 +3,10 @@
 use handeye_estimate::uncertainty::quality::TipBox;
 use nalgebra::{Point3, Vector3};
 
-/// Longer \[m\] is taken for millimetres.
+/// A longer length \[m\] is taken for millimetres.
 const FARTHEST_M: f64 = 10.0;
 
-/// Middle and edges of a box in the camera, `x,y,z,dx,dy,dz` in metres: x to the right, y down, z forward.
+/// Centre and edges of a box in the camera, `x,y,z,dx,dy,dz` in metres: x to the right, y down, z forward.
 ///
 /// # Errors
 /// What is wrong with the text.

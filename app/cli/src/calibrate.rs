@@ -44,7 +44,7 @@ pub struct CalibrateArgs {
     /// Keep views and corners that do not fit the others; without it they are left out as outliers and named.
     #[arg(long, help_heading = heading::ESTIMATE)]
     keep_outliers: bool,
-    /// Estimate the true size of the target, which the robot's translations tell.
+    /// Estimate the true size of the target, from the robot's translations.
     #[arg(long, help_heading = heading::ESTIMATE)]
     free_scale: bool,
     /// End with exit code 1 unless a number of the result is below a limit, such as `tip_error_95_mm<0.5`. A finding that

@@ -12,7 +12,7 @@ use handeye_workbench::arguments::{ArmErrorsChoice, heading};
 /// Options of `handeye cell`.
 #[derive(Debug, Args)]
 pub struct CellArgs {
-    /// Address of the network interface to serve on. Whoever can connect can move the arm: there is no password.
+    /// Address of the network interface to serve on. Anyone who can connect can move the arm: there is no password.
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1", help_heading = heading::ACCESS)]
     bind: String,
     /// Port; 0 picks one that is free.
@@ -26,19 +26,19 @@ pub struct CellArgs {
     /// Let simulated time run as fast as it can instead of like real time.
     #[arg(long, help_heading = heading::CELL)]
     fast: bool,
-    /// Have the board move: still, circle, figure_eight, random_walk or step; as the scene says if not given.
+    /// Move the board: still, circle, figure_eight, random_walk or step; from the scene if not given.
     #[arg(long, value_name = "PATH", help_heading = heading::BOARD)]
     board_path: Option<BoardPath>,
-    /// Mean speed of the board in m/s; as the scene says if not given.
+    /// Mean speed of the board in m/s; from the scene if not given.
     #[arg(long, value_name = "SPEED", help_heading = heading::BOARD)]
     board_speed: Option<f64>,
-    /// How far the path of the board reaches in m; as the scene says if not given.
+    /// How far the path of the board reaches in m; from the scene if not given.
     #[arg(long, value_name = "SIZE", help_heading = heading::BOARD)]
     board_size: Option<f64>,
-    /// Largest angle in degrees by which the board is turned on its way; as the scene says if not given.
+    /// Largest angle in degrees by which the board is turned on its way; from the scene if not given.
     #[arg(long, value_name = "ANGLE", help_heading = heading::BOARD)]
     board_tilt: Option<f64>,
-    /// Simulated time from image to image in s; as the scene says if not given.
+    /// Simulated time from image to image in s; from the scene if not given.
     #[arg(long, value_name = "SECONDS", help_heading = heading::CELL)]
     time_step: Option<f64>,
     /// Leave out the functions that CoppeliaSim does not have (`handeye.*`), to try a program as it runs there.
@@ -47,7 +47,7 @@ pub struct CellArgs {
 }
 
 impl CellArgs {
-    /// The scene with what the options say about it.
+    /// The scene with the changes from the options.
     fn scene(&self) -> Result<Scene, Failure> {
         let mut scene = self.scene.load()?;
         let motion = &mut scene.board.motion;
@@ -68,13 +68,13 @@ pub struct SceneArg {
     /// panda, xarm6; the reference scene if not given.
     #[arg(long, value_name = "FILE|NAME", help_heading = heading::CELL)]
     scene: Option<SceneChoice>,
-    /// How far the links of the arm are off those that its controller counts with; as the scene says if not given.
+    /// How far the links of the arm differ from those that its controller uses; from the scene if not given.
     #[arg(long, value_name = "LEVEL", value_enum, help_heading = heading::CELL)]
     arm_errors: Option<ArmErrorsChoice>,
 }
 
 impl SceneArg {
-    /// Reads the scene, with the errors of the arm that were asked for.
+    /// Reads the scene, with the requested errors of the arm.
     pub fn load(&self) -> Result<Scene, Failure> {
         let mut scene = self.scene.clone().unwrap_or_default().load().map_err(Failure::unusable)?;
         scene.robot.arm_errors = self.arm_errors.map_or(scene.robot.arm_errors, ArmErrorsChoice::levels);
@@ -102,7 +102,7 @@ pub fn run(args: &CellArgs) -> Result<(), Failure> {
     })
     .map_err(Failure::failed)?;
     if !server.is_local() {
-        // Even when quiet: nobody should learn of it from somebody else.
+        // Even when quiet: the user must be warned of it.
         out::note(format_args!(
             "warning: everybody on the network who reaches {} can move the arm and see its images, and there is no \
              password; --bind 127.0.0.1 serves this machine alone",

@@ -1,4 +1,4 @@
-//! Which cell a command works with, and what it may do there.
+//! Which cell a command works with, and what is allowed there.
 
 use clap::Args;
 use handeye_cell::scene::Scene;
@@ -11,7 +11,7 @@ use super::cell::SceneArg;
 use crate::{Failure, ObjectArgs};
 use handeye_workbench::arguments::heading;
 
-/// The share of its fastest speed at which a robot behind a driver is moved when nobody says otherwise, as in the window.
+/// The share of its fastest speed at which a robot behind a driver is moved if not given, as in the window.
 const REAL_SPEED: f64 = 0.25;
 
 /// Options that say which cell, and what is allowed there.
@@ -51,7 +51,7 @@ fn percent(text: &str) -> Result<f64, String> {
 }
 
 impl CellChoice {
-    /// Whether it is somebody's cell, and not one that is started for this command alone.
+    /// Whether it is an existing cell, and not one that is started for this command alone.
     pub fn is_given(&self) -> bool {
         self.connect.is_some() || self.driver.is_some()
     }
@@ -59,7 +59,7 @@ impl CellChoice {
     /// The scene of the built-in cell.
     ///
     /// # Errors
-    /// When it cannot be read, and when it goes with another cell.
+    /// When it cannot be read, and when it is given with another cell.
     pub fn scene(&self) -> Result<Scene, Failure> {
         if self.is_given()
             && let Some(option) = self.scene.given()
@@ -71,8 +71,7 @@ impl CellChoice {
         self.scene.load()
     }
 
-    /// The cell that was named; `None` where the built-in one is to be started. What is no address or no driver is found out
-    /// here.
+    /// The named cell; `None` if the built-in one has to be started. An invalid address or driver is found here.
     ///
     /// # Errors
     /// What is wrong with it.

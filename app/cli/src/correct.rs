@@ -1,4 +1,4 @@
-//! `handeye correct`: what to command so that the tip gets where it shall be, by the errors of the arm that a calibration found.
+//! `handeye correct`: what to command so that the tip gets to the goal, given the errors of the arm that a calibration found.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -21,16 +21,17 @@ pub const EXAMPLES: &str = "Examples:
   handeye correct result.json reported.csv --from-reported --out real.csv
   handeye correct result.json - --json -";
 
-/// What messages call the table that is read there.
+/// Name of the table in messages when it is read from there.
 const STANDARD_INPUT: &str = "standard input";
 
 /// Options of `handeye correct`.
 #[derive(Debug, Args)]
 pub struct CorrectArgs {
-    /// Solved session or dataset (a folder with result.json or calibration.json), or a result JSON, of an arm whose joints are known.
+    /// Solved session or dataset (a folder with result.json or calibration.json), or a result JSON, of an arm whose joints are
+    /// known.
     calibration: PathBuf,
-    /// CSV with a row for each pose that the tip shall reach: x,y,z,qx,qy,qz,qw in the base, metres; q1,q2,… may follow, joint
-    /// values in radians near which the arm shall be. `-` for standard input.
+    /// CSV with a row for each pose that the tip should reach: x,y,z,qx,qy,qz,qw in the base, metres; q1,q2,… may follow, joint
+    /// values in radians near which the arm should be. `-` for standard input.
     table: PathBuf,
     /// The rows are joint values q1,q2,… instead, radians, and the answer is where the tip really is.
     #[arg(long, help_heading = heading::POSES)]
@@ -43,7 +44,7 @@ pub struct CorrectArgs {
     json: Option<Output>,
 }
 
-/// What is answered for a row.
+/// The answer for a row.
 #[derive(Debug, Serialize)]
 struct Answer {
     joints_rad: Vec<f64>,
@@ -59,8 +60,8 @@ impl Answer {
     }
 }
 
-/// Writes the answers: joint values, the pose by the controller's own kinematics (with `--from-reported` the real one), and how far
-/// off the tip is expected to be at the most. Moves nothing.
+/// Writes the answers: joint values, the pose from the controller's own kinematics (with `--from-reported` the real one), and the
+/// largest expected error of the tip. Moves nothing.
 pub fn run(args: &CorrectArgs) -> Result<(), Failure> {
     let json_is_printed = args.json.as_ref().is_some_and(Output::is_standard);
     if json_is_printed && args.out.as_ref().is_some_and(Output::is_standard) {
@@ -140,7 +141,7 @@ fn table(answers: &[Answer], joints: usize) -> String {
     let mut text = joints.chain(rest).collect::<Vec<_>>().join(",") + "\n";
     for answer in answers {
         for value in answer.joints_rad.iter().chain(&answer.translation_m).chain(&answer.rotation_xyzw) {
-            // A nanometre and a nanoradian, and no minus before what is nothing.
+            // A nanometre and a nanoradian, and no minus sign before zero.
             let _infallible = write!(text, "{:.9},", value + 0.0);
         }
         let _infallible = writeln!(text, "{:.3}", answer.error_95_mm);

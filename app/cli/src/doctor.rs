@@ -30,7 +30,7 @@ pub struct DoctorArgs {
     all: bool,
 }
 
-/// Prints the diagnosis. A session that is ill is an answer, not a failure: the exit code is 0.
+/// Prints the diagnosis. A faulty session is an answer, not a failure: the exit code is 0.
 pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();
     let SessionObservations { observations, arm, robot_accuracy, .. } = solve::read(&args.path, &cancel)?.seen;
@@ -38,7 +38,7 @@ pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
     let diagnosis = match calibrate_with(&observations, Method::Joint, Options::default(), &wanted, &cancel) {
         Ok(calibration) => calibration.into_diagnosis(),
         Err(error @ CalibrateError::HandEye(HandEyeError::Cancelled)) => return Err(Failure::failed(error)),
-        // Why there is none is what the diagnosis is about.
+        // Why there is none is the subject of the diagnosis.
         Err(error) => {
             tracing::warn!("no calibration: {error}");
             diagnose(&observations, &wanted, &cancel)

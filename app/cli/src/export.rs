@@ -12,7 +12,7 @@ use handeye_session::{CaptureRecord, Session};
 use crate::{Failure, out, solve};
 use handeye_workbench::arguments::heading;
 
-/// What `calibrate --out` and `export --format json` call the result.
+/// Name of the result in `calibrate --out` and `export --format json`.
 const EXPORTED_RESULT: &str = "calibration.json";
 
 /// At the end of its help.
@@ -116,12 +116,12 @@ fn names(args: &ExportArgs) -> ExportNames {
     names
 }
 
-/// Whether a format asks for poses of images. Most do not, and then no dataset is read.
+/// Whether a format needs poses of images. Most do not, and then no dataset is read.
 fn needs_views(format: &dyn Format, input: &ExportInput<'_>) -> bool {
     matches!(handeye_export::preview(format, input), Err(ExportError::NeedsViews { .. }))
 }
 
-/// Images with robot poses of the session or data set that a result lies in; empty where there is none.
+/// Images with robot poses of the session or data set that contains a result; empty if there is none.
 fn read_views(path: &Path) -> Result<Vec<ExportView>, Failure> {
     let folder = if path.is_dir() { path } else { path.parent().unwrap_or(path) };
     if Session::is_session(folder) {

@@ -1,4 +1,4 @@
-//! How a command ends when it does not succeed.
+//! How a command ends if it does not succeed.
 
 use std::fmt;
 

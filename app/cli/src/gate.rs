@@ -1,4 +1,4 @@
-//! `--gate`: conditions on a result that decide over the exit code.
+//! `--gate`: conditions on a result that decide the exit code.
 
 use std::fmt;
 use std::str::FromStr;
@@ -13,7 +13,7 @@ pub struct Gate {
     limit: f64,
 }
 
-/// The numbers that a condition may be on, by their keys in the result.
+/// The numbers that a condition may use, by their keys in the result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Number {
     Rms,
@@ -66,7 +66,7 @@ impl Number {
 }
 
 /// Why a result does not pass its gates; empty when it does, and when there are none. A problem passes no gate: the numbers
-/// of a result that is not to be used mean nothing.
+/// of an unusable result mean nothing.
 pub fn failures(gates: &[Gate], result: &CalibrationResult) -> Vec<String> {
     let problem = result.problem().filter(|_| !gates.is_empty());
     let problem = problem.map(|finding| format!("{} is a problem: {}", finding.code, finding.text));

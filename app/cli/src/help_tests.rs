@@ -20,13 +20,13 @@ fn commands() -> Vec<(String, clap::Command)> {
     all
 }
 
-/// The command lines of its examples, as a shell takes them apart.
+/// The command lines of its examples, split as by a shell.
 fn examples(command: &clap::Command) -> Vec<Vec<String>> {
     let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
     let Some((_, examples)) = help.split_once("Examples") else { return Vec::new() };
     let (_, lines) = examples.split_once(":\n").expect("a heading");
     let lines = lines.replace("\\\n", "");
-    // What is further out is a heading.
+    // A line with less indentation is a heading.
     let lines = lines.lines().filter(|line| line.starts_with("  "));
     lines.flat_map(|line| line.split("&&")).map(|line| shlex::split(line).expect("words")).collect()
 }
@@ -67,7 +67,7 @@ fn options_are_listed_under_what_they_are_about() {
     }
 }
 
-/// A heading that belongs to the options of one struct takes all that follow it as well.
+/// A heading that belongs to the options of one struct applies to all that follow it as well.
 #[test]
 fn what_guided_capture_has_of_its_own_is_the_whole_of_its_heading() {
     let auto = commands().into_iter().find(|(path, _)| path == "handeye auto").expect("there").1;

@@ -1,4 +1,4 @@
-//! `handeye import`: other people's recordings as dataset folders.
+//! `handeye import`: recordings of other tools as dataset folders.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -43,7 +43,7 @@ pub struct ImportArgs {
     /// Write a dataset folder here; it must not be there yet, or be empty. Without it the hypotheses are only listed.
     #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: Option<PathBuf>,
-    /// What was looked at: 10x7x15 is a chessboard of 10 × 7 inner corners with squares of 15 mm; others as `handeye target`
+    /// The target in the images: 10x7x15 is a chessboard of 10 × 7 inner corners with squares of 15 mm; others as `handeye target`
     /// names them, kind=charuco,columns=4,rows=6,square=33,marker=20,dictionary=6x6_250.
     #[arg(long, value_name = "SPEC", help_heading = heading::MEANING)]
     target: Option<String>,
@@ -56,11 +56,11 @@ pub struct ImportArgs {
     /// Leave the images where they are; the data set names them there.
     #[arg(long, help_heading = heading::OUTPUT)]
     link: bool,
-    /// Stop reading the files after so many seconds. Looking at images takes no part of it: its progress is reported, and Ctrl-C
+    /// Stop reading the files after this many seconds. Detection in images does not count: its progress is reported, and Ctrl-C
     /// ends it.
     #[arg(long, value_name = "SECONDS", default_value_t = 20.0, value_parser = seconds, help_heading = heading::LIMITS)]
     time: f64,
-    /// Stop reading where compressed files unpack to more than so many GiB.
+    /// Stop reading where compressed files unpack to more than this many GiB.
     #[arg(long, value_name = "GIB", default_value_t = 4, value_parser = clap::value_parser!(u64).range(1..=1 << 20), help_heading = heading::LIMITS)]
     unpack: u64,
     /// Write what was found as JSON to this file; `-` for standard output instead of the text.
@@ -100,7 +100,7 @@ pub fn run(args: &ImportArgs) -> Result<(), Failure> {
     let recording = Arc::new(open(args, &cancel).map_err(Failure::unusable)?);
     let mut summary = Summary { text: found(&recording), notes: Vec::new() };
     let outcome = import(args, &recording, given, &settings, &mut summary, &cancel);
-    // What was found is reported in any case: it is what a refusal is about.
+    // What was found is reported in any case: a refusal refers to it.
     let findings = match &outcome {
         Ok(done) => done.findings.clone(),
         Err(refused) => refused.findings.clone().unwrap_or(serde_json::Value::Null),
@@ -114,7 +114,7 @@ fn seconds(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(is_some).ok_or_else(|| "seconds, from 0.001 to 1000000".to_owned())
 }
 
-/// Reads the files within the time and the bytes that are allowed.
+/// Reads the files within the allowed time and size.
 fn open(args: &ImportArgs, cancel: &CancelToken) -> Result<Recording, ImportError> {
     let begun = Instant::now();
     let elapsed = || begun.elapsed();
@@ -233,7 +233,7 @@ fn import(
     let h = &judgement.hypotheses[index];
     let known = looked.context(&judgement, settings, h, is_taken);
     if args.link {
-        // Names are relative to the folder, which has to be there to be a place.
+        // Names are relative to the folder, which has to exist to be resolved.
         std::fs::create_dir_all(folder).map_err(|e| Failure::unusable(anyhow!("{}: {e}", folder.display())))?;
     }
     let plan = import::plan(h, &known, args.link.then_some(folder.as_path()));
@@ -256,7 +256,7 @@ fn import(
     Ok(Done { findings })
 }
 
-/// The hypothesis to write, and whether a person took it out of several.
+/// The hypothesis to write, and whether the user chose it out of several.
 fn choose(judgement: &Judgement, take: Option<Take>) -> Result<(usize, bool), Failure> {
     let nothing = |what: String| Err(Failure::failed(anyhow!("nothing was written: {what}")));
     match (take, &judgement.verdict) {
@@ -379,7 +379,7 @@ fn listed(recording: &Recording, judgement: &Judgement, most: usize) -> String {
     text
 }
 
-/// Asks for the place of the camera, where nothing else is open, with both commands as they can be run.
+/// Asks for the place of the camera, if only that is open, with both commands ready to run.
 fn asked_for_mode(args: &ImportArgs) -> String {
     let command = |mode: &str| {
         let mut words = vec!["handeye".to_owned(), "import".to_owned(), args.path.display().to_string()];
@@ -410,7 +410,7 @@ fn asked_for_mode(args: &ImportArgs) -> String {
     )
 }
 
-/// A word as a shell takes it.
+/// A word quoted for a shell.
 fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "-_=./,:+@%".contains(c);
     if !word.is_empty() && word.chars().all(is_plain) {
@@ -482,7 +482,7 @@ mod tests {
         args: ImportArgs,
     }
 
-    /// What is printed to be copied is what was typed, with the choice, in words that a shell takes apart as they were.
+    /// What is printed to be copied is what was typed, with the choice, quoted so that a shell splits it as before.
     #[test]
     fn the_question_for_the_mode_gives_both_commands_ready_to_run() {
         let typed =

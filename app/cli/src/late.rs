@@ -6,19 +6,19 @@ use handeye_capture::NO_IMAGES_S;
 use handeye_link::PortError;
 use handeye_wording::text;
 
-/// Images that do not come, or cannot be had whole: on a machine under load the simulation moves on while one is read. Said once,
-/// and waited for as long as a capture waits.
+/// Images that do not arrive, or are incomplete: on a machine under load the simulation advances while one is read. Reported
+/// once, and waited for as long as a capture waits.
 #[derive(Debug, Default)]
 pub struct Late {
     since: Option<Instant>,
     is_said: bool,
 }
 
-/// How long images may be late \[s\] without a word: a slow camera takes as long from one to the next.
+/// How long images may be late \[s\] without a report: a slow camera has intervals of this length.
 const UNSAID_S: f64 = 1.0;
 
 impl Late {
-    /// There is none yet.
+    /// No image has arrived yet.
     ///
     /// # Errors
     /// Once there has been none for [`NO_IMAGES_S`].
@@ -36,7 +36,7 @@ impl Late {
         )))
     }
 
-    /// One has come.
+    /// One has arrived.
     pub fn came(&mut self) {
         *self = Self::default();
     }

@@ -51,7 +51,7 @@ pub use failure::Failure;
 use handeye_workbench::arguments::ObjectArgs;
 use rerun_arg::RerunArg;
 
-/// The least that is to be known.
+/// The minimum to know.
 const EXAMPLES: &str = "Examples, the first of which opens the window:
   handeye
   handeye sample --out my_robot_images
@@ -62,14 +62,14 @@ const EXAMPLES: &str = "Examples, the first of which opens the window:
 #[derive(Debug, Parser)]
 #[command(name = "handeye", version, max_term_width = 100, after_help = EXAMPLES)]
 struct Cli {
-    /// Say nothing but results and errors.
+    /// Print results and errors only.
     #[arg(long, short, global = true)]
     quiet: bool,
     #[command(subcommand)]
     command: Option<Command>,
 }
 
-/// What is recorded while it is looked at.
+/// What is recorded while it runs.
 #[derive(Debug, Default, clap::Args)]
 struct Recorded<T: clap::Args> {
     #[command(flatten)]
@@ -98,12 +98,12 @@ enum Command {
     /// Write the recorded sample that comes with the program as a dataset folder, to try the other commands on.
     #[command(after_help = sample::EXAMPLES)]
     Sample(sample::SampleArgs),
-    /// Say what is wrong with a session or a dataset folder, and what to do about it.
+    /// Report what is wrong with a session or dataset folder, and what to do about it.
     #[command(
         after_help = "Examples:\n  handeye sample --out my_robot_images\n  handeye doctor my_robot_images --json diagnosis.json"
     )]
     Doctor(doctor::DoctorArgs),
-    /// Say which poses would lower the expected error of a session or a dataset folder most.
+    /// List the poses that would lower the expected error of a session or dataset folder most.
     #[command(
         after_help = "Examples:\n  handeye sample --out my_robot_images\n  handeye plan my_robot_images --count 5 --json plan.json"
     )]
@@ -111,16 +111,16 @@ enum Command {
     /// Track the board live with a calibration, and have the arm follow it.
     #[command(after_help = track::EXAMPLES)]
     Track(track::TrackArgs),
-    /// Try a driver, or be one: a program between the workbench and any robot or camera (docs/drivers.md).
+    /// Test a driver, or run one: a program between the workbench and any robot or camera (docs/drivers.md).
     #[command(after_help = driver::EXAMPLES)]
     Driver(driver::DriverArgs),
-    /// Turn somebody's recording into a dataset folder: images with a table, a file to a pose, what other tools write.
+    /// Convert a recording into a dataset folder: images with a table or one file per pose, or files of other tools.
     #[command(after_help = import::after_help(), next_line_help = true)]
     Import(import::ImportArgs),
     /// Write calibration files from a solved session or a result JSON.
     #[command(after_help = export::EXAMPLES)]
     Export(export::ExportArgs),
-    /// Say what to command so that the tip gets where it shall be, by the errors of the arm that a calibration found.
+    /// Correct commands by the errors of the arm that a calibration found, so that the tip arrives where it should.
     #[command(after_help = correct::EXAMPLES)]
     Correct(correct::CorrectArgs),
     /// Print a target as a PDF at exact physical scale, with rulers to check the print.
@@ -138,7 +138,7 @@ pub fn main() -> ExitCode {
                 let printed = error.print().and_then(|()| std::io::stdout().flush());
                 return ended(out::finished(printed, "standard output"));
             }
-            // In an error there is what was typed, or what a pattern of the shell stood for.
+            // An error contains what was typed, or what a pattern of the shell expanded to.
             let words = error.render().to_string();
             if out::shown(&words) == words {
                 let _said = error.print().is_ok();
@@ -156,13 +156,13 @@ pub fn main() -> ExitCode {
             let is_local = args.bind.is_loopback();
             let announce = |url: &str| {
                 if !is_local {
-                    // Even when quiet: nobody should learn of it from somebody else.
+                    // Even when quiet: the user must be warned of it.
                     out::note(
                         "warning: everybody on the network who has the address with its key can move the arm and see \
                          its images, and nothing is encrypted; --bind 127.0.0.1 serves this machine alone",
                     );
                 }
-                // Nobody may listen to it any more: it is served all the same.
+                // Standard output may be closed: it is served all the same.
                 let _told = out::line(format_args!("the workbench is at {url}")).is_ok();
             };
             let relay = Arc::<Relay>::default();
@@ -196,7 +196,7 @@ fn ended(result: Result<(), Failure>) -> ExitCode {
 }
 
 /// Messages of level INFO and above to standard error, errors only with `--quiet`; `RUST_LOG` overrides. The libraries of
-/// Rerun (`re_…`) warn of things that users can do nothing about.
+/// Rerun (`re_…`) warn about things that users cannot change.
 fn start_logging(quiet: bool) {
     let default = if quiet { "error" } else { "warn,handeye=info,re_=error" };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default));

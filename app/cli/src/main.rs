@@ -2,8 +2,8 @@
 
 use std::process::ExitCode;
 
-/// Replies that wait for slow clients, and what recordings hold, come and go by tens of megabytes. This one gives them
-/// back to the system; that of glibc keeps what it once had.
+/// Replies that wait for slow clients, and what recordings hold, come and go by tens of megabytes. This allocator
+/// returns them to the system; that of glibc keeps them.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 

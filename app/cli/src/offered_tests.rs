@@ -1,4 +1,4 @@
-//! What the window offers of each driver is what its subcommand takes.
+//! What the window offers for each driver is what its subcommand accepts.
 
 use std::path::Path;
 
@@ -10,13 +10,13 @@ use handeye_workbench::connect::offered::FieldKind::{Switch, Text, Word};
 use handeye_workbench::connect::offered::Rank::Needed;
 use handeye_workbench::connect::offered::{ALL, Field, ON, Offered, Part, Values, of_part, parse};
 
-/// Options that make no sense in a window: who listens is another driver, and RTDE has one port.
+/// Options that make no sense in a window: listening is for another driver, and RTDE has one port.
 const NOT_OFFERED: [(&str, &str); 2] = [("fake", "--listen"), ("ur-rtde", "--port")];
 
-/// What an option is called, empty for an argument without one, and whether nothing goes without it.
+/// Name of an option, empty for an argument without one, and whether it is required.
 type Option = (String, bool);
 
-/// Those of a subcommand.
+/// The options of a subcommand.
 fn of_clap(command: &Command) -> Vec<Option> {
     let own = command.get_arguments().filter(|argument| argument.get_id() != "help");
     own.map(|argument| {
@@ -26,7 +26,7 @@ fn of_clap(command: &Command) -> Vec<Option> {
     .collect()
 }
 
-/// Those of a driver in Python, as its file adds them to a parser, with that which all have.
+/// The options of a driver in Python, as its file adds them to a parser, with the one that all have.
 fn of_python(source: &str) -> Vec<Option> {
     let added = source.split("add").filter_map(|call| {
         let call = call.strip_prefix("_argument").unwrap_or(call).strip_prefix('(')?;
@@ -74,13 +74,13 @@ fn filled(offered: &Offered, part: Part) -> Values {
     offered.fields_of(part).map(|field| (field.option, value(field))).filter(|(_, value)| !value.is_empty()).collect()
 }
 
-/// The driver in Python, if it is one, takes the values of its options.
+/// A driver in Python accepts the values of its options.
 fn is_taken_by_its_file(name: &str, options: &[String]) {
     let Some(shipped) = python::ALL.iter().find(|shipped| shipped.name == name) else { return };
     let Some(python) = handeye_geometry::testing::python() else { return };
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/drivers").join(shipped.file);
     let mut command = std::process::Command::new(python);
-    // Help is what it prints once all before it is understood; its name is what has it take `--python` as well.
+    // Help is printed once everything before it is parsed; the name makes it accept `--python` as well.
     let output = command.arg(file).args(options).arg("--help").env(python::NAME_VARIABLE, name).output();
     let output = output.expect("python runs");
     assert!(output.status.success(), "{options:?}: {}", String::from_utf8_lossy(&output.stderr));

@@ -25,38 +25,38 @@ use handeye_workbench::worker::FollowLine;
 use crate::Failure;
 use crate::cell_choice::CellChoice;
 
-/// How long a robot behind a driver may take to report where it is, and to be known by its joints.
+/// How long a robot behind a driver may take to report its pose, and to be identified by its joints.
 const FIRST_STATE: Duration = Duration::from_secs(5);
-/// Between two looks at what is waited for.
+/// Between two checks while waiting.
 const LOOK: Duration = Duration::from_millis(20);
-/// How long a robot that was told to stop may take to come to rest, as in the window.
+/// How long a robot that was commanded to stop may take to come to rest, as in the window.
 const TO_REST: Duration = Duration::from_secs(2);
 
-/// A cell and its connections. Motions go through [`Self::move_to`] alone, which logs them and moves no robot behind a driver that was
-/// not allowed to move.
+/// A cell and its connections. Motions go through [`Self::move_to`] only, which logs them and moves no robot behind a driver
+/// without permission.
 pub struct OpenCell {
     cell: Arc<dyn Cell>,
     pub control: Box<dyn ControlPort>,
     pub camera: Box<dyn CameraPort>,
     motion: Box<dyn MotionPort>,
     pub facts: CellFacts,
-    /// Whether simulated time is to go on by steps.
+    /// Whether simulated time is stepped.
     is_stepped: bool,
     speed: f64,
     /// Motions so far.
     motions: u64,
 }
 
-/// For a failure of a command.
+/// As a failure of a command.
 pub fn port_failure(error: &PortError) -> Failure {
     Failure::failed(anyhow::anyhow!("{}", error.why().in_language(Language::English)))
 }
 
 impl OpenCell {
-    /// Connects to the cell that was chosen, and starts the built-in one as `own` has it where none was.
+    /// Connects to the chosen cell, or starts the built-in one with `own` if none was chosen.
     ///
     /// # Errors
-    /// When it cannot be reached or started, or its robot does not say where it is.
+    /// When it cannot be reached or started, or its robot does not report where it is.
     pub fn connect(choice: &CellChoice, own: CellConfig, cancel: &CancelToken) -> Result<Self, Failure> {
         let paths = choice.paths(&own.scene.robot.name);
         let cell: Arc<dyn Cell> = match choice.source()? {
@@ -80,7 +80,7 @@ impl OpenCell {
         Ok(Self { cell, control, camera, motion, facts, is_stepped, speed, motions })
     }
 
-    /// Whether it is a simulation, which anybody may move.
+    /// Whether it is a simulation, which may always be moved.
     pub fn is_simulated(&self) -> bool {
         self.facts.moves == Moves::Freely
     }
@@ -93,12 +93,12 @@ impl OpenCell {
         Self::over(Arc::clone(&self.cell), !self.is_simulated(), self.speed, cancel)
     }
 
-    /// From now on at this share of its fastest speed at most.
+    /// From now on at most at this share of its fastest speed.
     pub fn go_no_faster_than(&mut self, share: f64) {
         self.speed = self.speed.min(share);
     }
 
-    /// Has a simulated arm do what is wished about the board that is tracked; see [`follow`].
+    /// Makes a simulated arm do what is requested about the tracked board; see [`follow`].
     ///
     /// # Errors
     /// When the connection is lost.
@@ -118,7 +118,7 @@ impl OpenCell {
         followed.map_err(|error| port_failure(&error))
     }
 
-    /// Lets the robot be moved: a simulated one, or one for which that was asked on the command line.
+    /// Allows motions of the robot: a simulated one, or one for which that was requested on the command line.
     ///
     /// # Errors
     /// When it may not be moved.
@@ -137,13 +137,13 @@ impl OpenCell {
     /// Where the robot is now.
     ///
     /// # Errors
-    /// When it does not say so.
+    /// When it does not report it.
     pub fn robot_state(&mut self) -> Result<RobotState, Failure> {
         let state = self.control.state().map_err(|error| port_failure(&error))?;
         state.ok_or_else(|| Failure::failed(anyhow::anyhow!("the robot does not report where it is")))
     }
 
-    /// The arm as guided capture drives it from where it stands; or why it cannot be.
+    /// The arm as guided capture drives it from its position; or why it cannot.
     ///
     /// # Errors
     /// When the connection is lost.
@@ -152,7 +152,7 @@ impl OpenCell {
         Ok(robot.map_err(|why| Failure::failed(anyhow::anyhow!("{}", why.in_language(Language::English)))))
     }
 
-    /// Views of a board, from where the arm stands; or why there are none.
+    /// Views of a board, from the arm's position; or why there are none.
     ///
     /// # Errors
     /// When the connection is lost.
@@ -167,8 +167,8 @@ impl OpenCell {
         Ok(views.map_err(|why| Failure::failed(anyhow::anyhow!("{}", why.in_language(Language::English)))))
     }
 
-    /// Where a simulated cell has its board: by its truth where it publishes that, and else by its scene; `None` where neither
-    /// knows.
+    /// Where a simulated cell has its board: from its ground truth if it publishes that, and else from its scene; `None` if
+    /// neither has it.
     ///
     /// # Errors
     /// When the connection is lost.
@@ -179,21 +179,21 @@ impl OpenCell {
         }
     }
 
-    /// The chain of the arm, where it is known.
+    /// The chain of the arm, if it is known.
     pub fn kinematics(&self) -> Option<&ArmKinematics> {
         self.facts.arm.as_ref()
     }
 
-    /// Plans for the arm by this chain from now on; before it is told what to keep out of.
+    /// Plans for the arm with this chain from now on; to be called before the keep-out boxes are set.
     pub fn plan_by(&mut self, kinematics: ArmKinematics) {
         self.motion.plan_by(&kinematics);
         self.facts.arm = Some(kinematics);
     }
 
-    /// Has the arm keep out of these from now on.
+    /// Makes the arm keep out of these from now on.
     ///
     /// # Errors
-    /// When they cannot be kept out of, since the chain of the arm is not known.
+    /// When that is not possible because the chain of the arm is not known.
     pub fn keep_out(&mut self, keep_out: &Surroundings) -> Result<(), Failure> {
         self.motion.keep_out(keep_out).map_err(|why| {
             Failure::failed(anyhow::anyhow!(
@@ -204,12 +204,12 @@ impl OpenCell {
         Ok(())
     }
 
-    /// The fastest that a simulated arm moves from now on.
+    /// The limits of a simulated arm from now on.
     pub fn limit(&mut self, limits: &MotionLimits) {
         self.motion.limit(limits);
     }
 
-    /// Starts the simulation. Stepped, a pass takes as long as it takes, and the same command gives the same images on every
+    /// Starts the simulation. If stepped, a pass may take any time, and the same command gives the same images on every
     /// machine.
     ///
     /// # Errors
@@ -231,7 +231,7 @@ impl OpenCell {
         self.motion.pass(cancel)
     }
 
-    /// Takes up again what was interrupted, as new clients of the same server.
+    /// Resumes what was interrupted, as new clients of the same server.
     ///
     /// # Errors
     /// [`PortError`].
@@ -270,7 +270,7 @@ impl OpenCell {
         outcome
     }
 
-    /// What moves a real robot is always said; simulated ones move for whoever watches.
+    /// Motions of a real robot are always printed; simulated ones are only logged.
     fn log(&self, line: &str) {
         if self.is_simulated() {
             tracing::debug!("{line}");
@@ -309,13 +309,14 @@ impl OpenCell {
         }
     }
 
-    /// Whether somebody has paused the simulation.
+    /// Whether another client has paused the simulation.
     pub fn is_paused(&mut self) -> bool {
         matches!(self.control.state(), Ok(Some(state)) if state.simulation == Simulation::Paused)
     }
 
-    /// Has the robot stay where it is, whatever happened on the way, and leaves the simulation as it was: it ends with `ends_simulation`.
-    /// A robot behind a driver is told to stop where it was `interrupted`, says whether it stands, and may not be moved any longer.
+    /// Leaves the robot where it is, whatever happened before, and the simulation as it was: it ends with `ends_simulation`. A
+    /// robot behind a driver is commanded to stop if it was `interrupted`, whether it is at rest is reported, and it may not be
+    /// moved any longer.
     pub fn leave(&mut self, interrupted: bool, ends_simulation: bool) {
         if !self.is_simulated() {
             if interrupted {
@@ -333,7 +334,7 @@ impl OpenCell {
         }
     }
 
-    /// As STOP in the window: what the robot's states say of it counts.
+    /// As STOP in the window: the reported states of the robot count.
     fn stop_and_watch(&mut self) {
         if let Err(error) = self.control.stop() {
             let why = error.why().in_language(Language::English);
@@ -364,8 +365,8 @@ impl OpenCell {
     }
 }
 
-/// What the cell says of itself, once its robot is heard of. A chain of joints that a driver names is given a moment to be
-/// placed.
+/// What the cell reports about itself, once its robot has reported. A chain of joints that a driver names is given a
+/// moment to be placed.
 fn first_facts(control: &mut dyn ControlPort, cancel: &CancelToken) -> Result<CellFacts, Failure> {
     let failed = |error: PortError| port_failure(&error);
     let until = Instant::now() + FIRST_STATE;

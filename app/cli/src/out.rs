@@ -1,8 +1,8 @@
-//! The one way to standard output and standard error. `println!` panics where nobody reads or the disk is full; nothing
-//! here does, and clippy keeps it the one way.
+//! The one way to standard output and standard error. `println!` panics if the pipe is closed or the disk is full;
+//! nothing here does, and clippy enforces its use.
 //!
-//! Names and messages come from strangers: files, drivers, servers. A terminal obeys some characters instead of showing
-//! them, so every line for a person goes through [`shown`].
+//! Names and messages come from untrusted sources: files, drivers, servers. A terminal interprets some characters
+//! instead of showing them, so every line for the user goes through [`shown`].
 
 use std::borrow::Cow;
 use std::fmt::{Display, Write as _};
@@ -28,7 +28,7 @@ pub fn line(line: impl Display) -> Result<(), Failure> {
     print(&format!("{line}\n"))
 }
 
-/// Writes what a program may read to standard output, byte for byte; a terminal is shown it as text.
+/// Writes what a program may read to standard output, byte for byte; a terminal gets it as text.
 ///
 /// # Errors
 /// As [`finished`].
@@ -43,7 +43,7 @@ fn for_standard_output(bytes: &[u8]) -> Cow<'_, [u8]> {
     Cow::Owned(shown(&String::from_utf8_lossy(bytes)).into_owned().into_bytes())
 }
 
-/// Standard output that is written bit by bit, line by line; as [`bytes`].
+/// Standard output that is written piece by piece, line by line; as [`bytes`].
 #[derive(Debug, Clone, Copy)]
 pub struct Results;
 
@@ -58,7 +58,7 @@ impl Write for Results {
     }
 }
 
-/// Text as a terminal may have it: what it would obey, or what would turn the order of letters about, is spelled out.
+/// Text that is safe for a terminal: control characters and those that change the direction of text are escaped.
 pub fn shown(text: &str) -> Cow<'_, str> {
     if !text.contains(is_obeyed) {
         return Cow::Borrowed(text);
@@ -75,7 +75,7 @@ pub fn shown(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// Controls of terminals, in both their ranges, and those of the direction of letters.
+/// Control characters of terminals, in both their ranges, and those of text direction.
 fn is_obeyed(letter: char) -> bool {
     let is_direction = matches!(letter, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     is_direction || (letter.is_control() && !matches!(letter, '\n' | '\t'))
@@ -83,12 +83,12 @@ fn is_obeyed(letter: char) -> bool {
 
 fn write(bytes: &[u8]) -> Result<(), Failure> {
     let mut stdout = io::stdout().lock();
-    // Flushed here: at the end of the program nobody would hear that it failed.
+    // Flushed here: at the end of the program a failure could not be reported.
     finished(stdout.write_all(bytes).and_then(|()| stdout.flush()), "standard output")
 }
 
-/// How writing to something that is no file has ended. A pipe whose reader has gone is no failure: it has seen what it
-/// wanted.
+/// The outcome of writing to something that is not a file. A pipe whose reader has closed it is not a failure: the
+/// reader has seen enough.
 ///
 /// # Errors
 /// Whatever else the system reports.
@@ -101,15 +101,15 @@ pub fn finished(written: io::Result<()>, place: impl Display) -> Result<(), Fail
     }
 }
 
-/// Writes one line for a person to standard error. That this fails cannot be reported anywhere.
+/// Writes one line for the user to standard error. A failure cannot be reported anywhere.
 pub fn note(line: impl Display) {
     let _said = Log { is_coloured: false }.write_all(format!("{line}\n").as_bytes()).is_ok();
 }
 
-/// Standard error for lines that must not stop the work: it takes all of them.
+/// Standard error for lines that must not stop the work: it accepts all of them.
 #[derive(Debug, Clone, Copy)]
 pub struct Log {
-    /// Whether colours are switched by whoever writes the lines; what they say is then made harmless by him.
+    /// Whether the writer of the lines sets colours; the writer then also escapes the content.
     pub is_coloured: bool,
 }
 
@@ -126,7 +126,7 @@ impl Write for Log {
     }
 }
 
-/// As [`shown`], except that colours stay.
+/// As [`shown`], except that colours are kept.
 fn coloured(text: &str) -> Cow<'_, str> {
     const BEGIN: &str = "\u{1b}[";
     let Some(at) = text.find(BEGIN) else { return shown(text) };
@@ -148,7 +148,7 @@ fn coloured(text: &str) -> Cow<'_, str> {
     Cow::Owned(coloured)
 }
 
-/// So many of something, as a person says it: “1 view”, “2 views”.
+/// A count with its noun: “1 view”, “2 views”.
 pub fn counted(count: usize, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
 }
@@ -162,7 +162,7 @@ mod tests {
         for harmless in ["", "poses.csv\t12\n", "图像/一.png ±0.3 mm °", "a\\u{1b}b"] {
             assert_eq!(shown(harmless), harmless);
         }
-        // Colours, the title of the window, the clipboard, 8-bit controls, going back over a line, and letters in reverse.
+        // Colours, the title of the window, the clipboard, 8-bit controls, going back over a line, and reversed letters.
         for obeyed in
             ["\u{1b}[31m", "\u{1b}]0;x\u{7}", "\u{1b}]52;c;eA==\u{7}", "\u{9b}2J", "a\rb", "a\u{8}b", "\u{7f}", "\0"]
                 .into_iter()

@@ -13,7 +13,7 @@ use super::{Failure, out};
 /// Where an output goes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Output {
-    /// `-`, and every name of what standard output is, such as `/dev/stdout`.
+    /// `-`, and every name of standard output, such as `/dev/stdout`.
     Standard,
     /// A pipe, a device or an open file of this process, which is written to and never replaced.
     Direct(PathBuf),
@@ -37,12 +37,12 @@ impl From<OsString> for Output {
 
 impl Output {
     fn of_link(path: PathBuf) -> Self {
-        // In a folder that may be somebody else's, the link may be as well.
+        // In a folder of another user, the link may be another user's as well.
         if own_folder::root_of(&path).is_some() {
             return Self::File(path);
         }
         let leads_to_a_file = fs::metadata(&path).map_or(true, |found| found.is_file() || found.is_dir());
-        // Links of the system to files that are open already, such as /dev/fd/3, are not there to be replaced.
+        // Links of the system to files that are open already, such as /dev/fd/3, cannot be replaced.
         let folder = path.parent().map(|folder| folder.canonicalize().unwrap_or_default()).unwrap_or_default();
         let is_of_system = ["/dev", "/proc"].iter().any(|system| folder.starts_with(system));
         if leads_to_a_file && !is_of_system && !is_standard_output(&path) {
@@ -56,7 +56,7 @@ impl Output {
         if is_standard_output(&path) { Self::Standard } else { Self::Direct(path) }
     }
 
-    /// Whether it takes the place of what is otherwise printed for a person.
+    /// Whether it replaces what is otherwise printed.
     pub fn is_standard(&self) -> bool {
         *self == Self::Standard
     }
@@ -64,7 +64,7 @@ impl Output {
     /// Writes all of it.
     ///
     /// # Errors
-    /// When it cannot be written. A pipe that was closed by its reader is no failure.
+    /// When it cannot be written. A pipe that was closed by its reader is not a failure.
     pub fn write(&self, bytes: &[u8]) -> Result<(), Failure> {
         match self {
             Self::Standard => out::bytes(bytes),
@@ -76,7 +76,7 @@ impl Output {
         }
     }
 
-    /// Opens it to be written bit by bit; a file is then what has been written so far.
+    /// Opens it to be written piece by piece; a file then contains what has been written so far.
     ///
     /// # Errors
     /// When it cannot be opened.
@@ -98,7 +98,7 @@ impl std::fmt::Display for Output {
     }
 }
 
-/// Opens a pipe or a device. What is a file behind it goes on at its end, as the shell left it.
+/// Opens a pipe or a device. A file behind it is continued at its end, as the shell left it.
 fn open(path: &Path) -> io::Result<File> {
     OpenOptions::new().append(true).open(path)
 }
@@ -107,7 +107,7 @@ fn cannot_write(path: &Path, error: &io::Error) -> Failure {
     Failure::failed(anyhow!("{} cannot be written: {error}", path.display()))
 }
 
-/// Whether a path leads to what standard output is.
+/// Whether a path leads to standard output.
 #[cfg(unix)]
 fn is_standard_output(path: &Path) -> bool {
     use std::os::fd::AsFd as _;
@@ -150,7 +150,7 @@ mod tests {
         let reader = File::open(at("file")).expect("a file");
         let descriptor = PathBuf::from(format!("/dev/fd/{}", std::os::fd::AsRawFd::as_raw_fd(&reader)));
         assert_eq!(output(&descriptor), Output::Direct(descriptor.clone()), "an open file is not replaced");
-        // Whoever made this folder made the link as well.
+        // The owner of this folder created the link as well.
         fs::write(at("session.json"), "{}").expect("written");
         assert_eq!(output(&at("to-null")), Output::File(at("to-null")));
     }

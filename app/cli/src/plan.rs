@@ -18,7 +18,7 @@ use super::output::Output;
 use crate::{Failure, box_arg, out, solve};
 use handeye_workbench::arguments::heading;
 
-/// An error that is the distance from a tool to a point of the board by commands as they are, and by corrected ones.
+/// The error of the distance from a tool to a point of the board, with uncorrected commands and with corrected ones.
 const REACH: &str = "reach";
 const REACH_CORRECTED: &str = "reach_corrected";
 
@@ -42,14 +42,14 @@ pub struct PlanArgs {
     json: Option<Output>,
 }
 
-/// The poses that come next.
+/// The next poses.
 #[derive(Debug, Serialize)]
 struct PlanDocument {
     format: &'static str,
     version: u32,
-    /// What errors are of, where the joints of the arm are known: `reach_corrected`, the distance from a tool to a point of the board by
-    /// corrected commands, or `reach`, by commands as they are where correcting brings the tool no nearer. Else `point`, a measured point
-    /// by the noise alone.
+    /// What the errors refer to, if the joints of the arm are known: `reach_corrected`, the distance from a tool to a point of the
+    /// board with corrected commands, or `reach`, with uncorrected commands if correcting brings the tool no nearer. Else `point`,
+    /// a measured point, from the noise alone.
     error_of: &'static str,
     /// The error now, 95 %, millimetres.
     error_mm: f64,
@@ -76,7 +76,7 @@ impl<Dst: Frame, Src: Frame> From<&Pose<Dst, Src>> for Transform {
     }
 }
 
-/// Prints the poses. Whether the way to them is free is not known here.
+/// Prints the poses. Whether the path to them is free is not known here.
 pub fn run(args: &PlanArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();
     let seen = solve::read(&args.path, &cancel)?.seen;
@@ -94,7 +94,7 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
         )));
     }
     let options = GuidedOptions {
-        // Poses are asked for, however good the answer is.
+        // Poses are requested, however good the answer is.
         goal_m: 0.0,
         least_gain: 0.0,
         most_views: usize::MAX,
@@ -157,7 +157,7 @@ fn table(document: &PlanDocument) -> String {
     for (index, pose) in document.poses.iter().enumerate() {
         let [x, y, z] = pose.base_from_tip.translation_m.map(|m| m * 1e3);
         let [qx, qy, qz, qw] = pose.base_from_tip.rotation_xyzw;
-        // Into a string nothing can fail.
+        // Writing to a string cannot fail.
         let _written = writeln!(
             text,
             "{:2} {x:9.1} {y:9.1} {z:9.1} {qx:8.4} {qy:8.4} {qz:8.4} {qw:8.4} {:11.3}",

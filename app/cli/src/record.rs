@@ -10,7 +10,7 @@ use handeye_record::Recorder;
 use handeye_workbench::model::{CellFacts, ColouredDepth, FrameImages, FrameInfo, LiveFrame};
 use handeye_workbench::recording::{Entry, Recording as _};
 
-/// The cell and what it publishes of itself.
+/// The cell and what it publishes about itself.
 pub fn cell(recorder: &Recorder, facts: &CellFacts) {
     if recorder.is_on() {
         recorder.note(Entry::Cell(Arc::new(facts.clone())));
@@ -34,7 +34,7 @@ pub fn image(recorder: &Recorder, LiveFrame { info, images }: LiveFrame) {
     recorder.note(Entry::Image { info: Box::new(info), images });
 }
 
-/// Images as the window has them, without colours of depths: those are the window's, and a viewer has its own.
+/// Images as in the window, without colours of depths: a viewer has its own.
 pub fn live_frame(raw: RawFrame, depth_range_m: [f32; 2], number: u64, received_s: f64) -> LiveFrame {
     let info = FrameInfo {
         number,

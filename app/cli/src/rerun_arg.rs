@@ -1,5 +1,5 @@
-//! The option `--rerun` of every command that has something to show, and the recording: begun as it asks, ended after the
-//! result.
+//! The option `--rerun` of every command that has something to show, and the recording: started as requested, ended after
+//! the result.
 
 use std::ffi::OsString;
 use std::time::Duration;
@@ -17,10 +17,10 @@ use handeye_workbench::model::ViewerState;
 use handeye_workbench::recording::Recording as _;
 use handeye_workbench::text::Language;
 
-/// How long a command waits at its end for what is still to be written. A pipe to a viewer elsewhere may be slow.
+/// How long a command waits at its end for pending writes. A pipe to a viewer elsewhere may be slow.
 const DEADLINE: Duration = Duration::from_secs(20);
 
-/// Between two looks at the viewer.
+/// Between two checks of the viewer.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// The option `--rerun`.
@@ -34,12 +34,12 @@ pub struct RerunArg {
 }
 
 impl RerunArg {
-    /// What was asked for, or else what the command does by itself.
+    /// The requested choice, or else the default of the command.
     pub fn choice(&self, otherwise: RerunChoice) -> RerunChoice {
         self.rerun.clone().unwrap_or(otherwise)
     }
 
-    /// What was asked for.
+    /// The requested choice.
     pub fn asked(&self) -> Option<&RerunChoice> {
         self.rerun.as_ref()
     }
@@ -86,7 +86,7 @@ fn is_option(argument: &OsString) -> bool {
     argument.to_string_lossy().starts_with('-')
 }
 
-/// Whether the file that was named can be written.
+/// Checks that the named file can be written.
 ///
 /// # Errors
 /// When it cannot.
@@ -99,20 +99,20 @@ fn check(argument: &RerunArg) -> Result<(), Failure> {
     })
 }
 
-/// Has a window recorded, beside its session if nothing else was asked for.
+/// Records a window, next to its session if nothing else was requested.
 ///
 /// # Errors
-/// When the file that was named cannot be written.
+/// When the named file cannot be written.
 pub fn of_window(argument: &RerunArg, web: WebViewer) -> Result<Begin, Failure> {
     check(argument)?;
     let choice = argument.choice(RerunChoice::Record);
     Ok(Box::new(move |app| Ok(record(app, choice, web)?)))
 }
 
-/// Begins the recording of a command that ends.
+/// Starts the recording of a command that ends.
 ///
 /// # Errors
-/// When the file that was named cannot be written.
+/// When the named file cannot be written.
 pub fn start(
     argument: &RerunArg,
     otherwise: RerunChoice,
@@ -136,7 +136,7 @@ pub fn start(
     Ok(recorder)
 }
 
-/// Waits until the viewer is open, or is not.
+/// Waits until the viewer is open, or has failed.
 fn opened(recorder: &Recorder, cancel: &CancelToken) -> ViewerState {
     loop {
         let viewer = recorder.state().viewer;
@@ -147,11 +147,11 @@ fn opened(recorder: &Recorder, cancel: &CancelToken) -> ViewerState {
     }
 }
 
-/// Ends the recording of a command, after its result was printed. What a viewer reads comes out of this program, so that
-/// it goes on until the viewer is closed, or until Ctrl-C.
+/// Ends the recording of a command, after its result was printed. A viewer reads from this program, so it keeps running
+/// until the viewer is closed, or until Ctrl-C.
 ///
 /// # Errors
-/// When the viewer that was asked for is not there.
+/// When the requested viewer is not open.
 pub fn finish(mut recorder: Recorder, cancel: &CancelToken) -> Result<(), Failure> {
     let mut failed = None;
     match opened(&recorder, cancel) {

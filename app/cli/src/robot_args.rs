@@ -1,4 +1,4 @@
-//! `--tool` and `--robot-accuracy`: what is said of the robot for the errors that a tool arrives within.
+//! `--tool` and `--robot-accuracy`: what is stated about the robot for the error of a tool.
 
 use clap::Args;
 use handeye_dataset::LONGEST_TOOL_M;
@@ -10,19 +10,19 @@ use handeye_workbench::arguments::heading;
 /// Options of commands that say how near a tool arrives.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
 pub struct RobotArgs {
-    /// Where the tip of the tool is in the frame of the TCP, metres, for the errors that a tool arrives within; what the data say if not
+    /// Where the tip of the tool is in the frame of the TCP, metres, for the error of a tool's position; as in the data if not
     /// given, or 0,0,0.1.
     #[arg(long = "tool", value_name = "X,Y,Z", value_parser = tool, allow_hyphen_values = true, help_heading = heading::ESTIMATE)]
     pub tool_m: Option<[f64; 3]>,
-    /// How far the TCP is from where the robot reports it, RMS over the region where it works: some tenths of a millimetre and more, not
-    /// the repeatability of the data sheet; what the data say if not given. A tool arrives within an error that follows from it where the
-    /// errors of the arm are not known.
+    /// How far the TCP is from where the robot reports it, RMS over the region where it works: some tenths of a millimetre and
+    /// more, not the repeatability of the data sheet; as in the data if not given. A tool arrives within an error that follows
+    /// from it where the errors of the arm are not known.
     #[arg(long = "robot-accuracy", value_name = "MM", value_parser = accuracy, help_heading = heading::ESTIMATE)]
     pub accuracy_mm: Option<f64>,
 }
 
 impl RobotArgs {
-    /// Says it of what was observed in `document`.
+    /// Adds it to what was observed in `document`.
     pub fn put_into(&self, seen: &mut SessionObservations, document: &Document) {
         let tool_m = self.tool_m.or(document.meta.tool_m);
         if let Some(arm) = &mut seen.arm {
@@ -32,7 +32,7 @@ impl RobotArgs {
         seen.robot_accuracy = accuracy_mm.map(|mm| RobotAccuracy::new(mm, tool_m));
     }
 
-    /// Whether anything is said.
+    /// Whether anything is stated.
     pub fn is_given(&self) -> bool {
         *self != Self::default()
     }

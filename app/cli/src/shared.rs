@@ -14,7 +14,7 @@ use super::solve::{self, Input, Solution};
 use super::{Failure, out};
 use handeye_workbench::{report, worker};
 
-/// Under which a result says that its lens was estimated with that of other sessions: the digests of their input.
+/// The key under which a result lists with which other sessions its lens was estimated: the digests of their input.
 const OPTION: &str = "share_intrinsics";
 
 /// Reads folders and calibrates them together; one answer for each, in their order.
@@ -91,7 +91,7 @@ fn folder_names(paths: &[&Path]) -> Vec<String> {
     names
 }
 
-/// Writes the array of all results where it is wanted and prints a report, unless the array is printed in its place.
+/// Writes the array of all results where requested and prints a report, unless the array is printed instead.
 pub fn publish(solutions: &[Solution], json: Option<&Output>) -> Result<(), Failure> {
     if let Some(output) = json {
         let results: Vec<&CalibrationResult> = solutions.iter().map(Solution::result).collect();

@@ -30,9 +30,9 @@ use handeye_workbench::worker::{self, SolveJob};
 /// Name of the result in a session.
 pub const RESULT_FILE: &str = session::RESULT;
 
-/// What a folder holds: a session by its document, whatever else lies in it, or a data set.
+/// The content of a folder: a session if it has a document, whatever else it contains, or a data set.
 pub struct Input {
-    /// The captures; of a data set as a session would have them.
+    /// The captures; those of a data set as a session would have them.
     pub document: Arc<Document>,
     /// What was observed in them.
     pub seen: SessionObservations,
@@ -87,9 +87,9 @@ fn not_observed(error: ObserveError) -> Failure {
     }
 }
 
-/// A folder that nobody has described yet is answered with a description to fill in.
+/// For a folder without a description, the answer is a description to fill in.
 fn not_a_data_set(folder: &Path, error: DatasetError) -> Failure {
-    // Empty is what a shell makes of it before the template is written into it.
+    // A file is empty if a shell creates it before the template is written into it.
     let is_undescribed = match error.problem {
         DatasetProblem::NotADataset => folder.is_dir(),
         DatasetProblem::Empty(_) => error.file == folder.join(DESCRIPTION),
@@ -112,7 +112,7 @@ fn not_a_data_set(folder: &Path, error: DatasetError) -> Failure {
     ))
 }
 
-/// The answer for a folder, with all that led to it.
+/// The answer for a folder, with everything that led to it.
 pub struct Solution {
     folder: PathBuf,
     input: Input,
@@ -120,13 +120,13 @@ pub struct Solution {
 }
 
 impl Solution {
-    /// Of a folder by what was read and found in it.
+    /// For a folder, from what was read and found in it.
     pub fn new(folder: &Path, input: Input, mut solved: Solved) -> Self {
         solved.result.provenance.input_sha256 = Some(input.sha256.clone());
         Self { folder: folder.to_path_buf(), input, solved: Arc::new(solved) }
     }
 
-    /// That its poses were chosen on the way, and why.
+    /// Records that its poses were chosen along the way, and why.
     pub fn guided_by(&mut self, record: Option<GuidedRecord>) {
         Arc::make_mut(&mut self.solved).result.guided = record;
     }
@@ -146,12 +146,12 @@ impl Solution {
         self.result().views.iter().filter(|view| view.status == ViewRecordStatus::Used).count()
     }
 
-    /// All of it for a person. It ends with a newline.
+    /// The whole report. It ends with a newline.
     fn report(&self) -> String {
         report::page(&self.solved)
     }
 
-    /// Writes the JSON where it is wanted and prints the report, unless the JSON is printed in its place.
+    /// Writes the JSON where requested and prints the report, unless the JSON is printed instead.
     pub fn publish(&self, json: Option<&Output>) -> Result<(), Failure> {
         if let Some(output) = json {
             let text = self.result().to_json().map_err(Failure::failed)?;
@@ -176,7 +176,7 @@ impl Solution {
                 corners,
                 depth,
                 image_size: observations.image_size,
-                // Nobody looks at small copies here.
+                // Thumbnails are not shown here.
                 thumbnail: Arc::default(),
             };
             recorder.note(Entry::Observed { id: *id, observed: Arc::new(observed) });
@@ -185,21 +185,21 @@ impl Solution {
     }
 }
 
-/// What is wanted of the answer for a folder.
+/// What is requested for a folder.
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted {
     /// Which answer.
     pub method: Method,
-    /// What is changed about it.
+    /// The changed options.
     pub options: Options,
     /// The error (95 %) to reach, metres.
     pub goal_m: f64,
-    /// What is said of the robot, instead of what the folder says.
+    /// What is stated about the robot, overriding what the folder states.
     pub robot: RobotArgs,
 }
 
-/// Reads a folder, finds the target in its images, calibrates, and checks the answer on the captures that are kept for it; the truth
-/// is only compared with.
+/// Reads a folder, finds the target in its images, calibrates, and checks the answer on the captures that are kept for it; the
+/// truth is only used for comparison.
 pub fn folder(path: &Path, wanted: Wanted, truth: Option<Truth>, cancel: &CancelToken) -> Result<Solution, Failure> {
     let mut input = read(path, cancel)?;
     let Wanted { method, options, goal_m, robot } = wanted;
@@ -210,14 +210,15 @@ pub fn folder(path: &Path, wanted: Wanted, truth: Option<Truth>, cancel: &Cancel
     Ok(Solution::new(path, input, solved))
 }
 
-/// What is asked about a folder that was read.
+/// The job for a folder that was read.
 pub fn job(input: &Input, method: Method, options: Options) -> SolveJob {
     let SessionObservations { observations, captures, verification, arm, robot_accuracy } = input.seen.clone();
     let (id, goal_m, truth) = (JobId(0), Goal::default().0, None);
     SolveJob { id, observations, captures, verification, method, options, goal_m, arm, robot_accuracy, truth }
 }
 
-/// Where there is no answer the data may be at fault: how the poses were written is reported at once, the rest by the doctor.
+/// If there is no answer the data may be at fault: a wrong convention of the poses is reported at once, the rest by the
+/// doctor.
 pub fn unsolved(error: CalibrateError, folder: &Path, observations: &Observations, cancel: &CancelToken) -> Failure {
     match error {
         CalibrateError::HandEye(HandEyeError::Cancelled) => Failure::failed(error),
@@ -228,7 +229,7 @@ pub fn unsolved(error: CalibrateError, folder: &Path, observations: &Observation
     }
 }
 
-/// That the poses were written otherwise than was stated, in another unit or direction, if they were.
+/// A message that the poses were written differently than stated, in another unit or direction, if they were.
 fn misread(observations: &Observations, cancel: &CancelToken) -> Option<String> {
     let findings = diagnose(observations, &FindingOptions::default(), cancel).findings;
     let is_so = |finding: &&Finding| {
@@ -263,7 +264,7 @@ fn as_document(dataset: &Dataset) -> Document {
 }
 
 /// Every format that the result has the data for, into a folder. Poses of images are left to `export`: their files have
-/// to lie beside the images.
+/// to be next to the images.
 pub fn write_exports(folder: &Path, result: &CalibrationResult) -> Result<Vec<PathBuf>, Failure> {
     let names = ExportNames::default();
     let input = ExportInput::new(result, &names);
@@ -287,7 +288,7 @@ pub fn cancel_on_ctrl_c() -> CancelToken {
         }
         shared.cancel();
     };
-    // A second handler in one process is refused; the first one then serves.
+    // A second handler in one process is refused; the first one is then used.
     if let Err(error) = ctrlc::set_handler(handler) {
         tracing::debug!(%error, "Ctrl-C is already handled");
     }

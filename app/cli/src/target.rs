@@ -40,7 +40,7 @@ pub fn run(args: &TargetArgs) -> Result<(), Failure> {
     out::note(format_args!("{target}, on a page of {width} × {height} mm"));
     out::note("print at 100 % (actual size); both rulers must then be 100 mm long");
     out::note(format_args!("wrote {}", args.pdf));
-    // What a data set says of it, to be copied.
+    // Its description for a data set, to be copied.
     let table = target_table(&target);
     if args.pdf.is_standard() {
         out::note(table.trim_end());

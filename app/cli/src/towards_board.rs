@@ -1,4 +1,4 @@
-//! Where a simulated arm goes that does not see the board from where it stands.
+//! Where a simulated arm goes if it does not see the board from its position.
 
 use std::path::Path;
 
@@ -11,17 +11,17 @@ use crate::open_cell::OpenCell;
 
 /// How many views are tried.
 const VIEWS: usize = 3;
-/// Chooses them; any does.
+/// Seed for choosing them; any will do.
 const SEED: u64 = 1;
 
 /// A place from which the board should be in view.
 pub struct TowardsBoard {
-    /// What is said of it.
+    /// Its name in messages.
     pub name: &'static str,
     pub goal: Goal,
 }
 
-/// The board and the camera where a simulated cell has them; `None` where it does not say.
+/// The board and the camera according to a simulated cell; `None` if it does not report them.
 pub fn board_in_view(cell: &mut OpenCell) -> Result<Option<BoardInView>, Failure> {
     let base_from_target = cell.base_from_target(&BOARD)?;
     let in_view = cell.facts.truth.as_ref().zip(base_from_target).map(|(truth, base_from_target)| BoardInView {
@@ -34,8 +34,8 @@ pub fn board_in_view(cell: &mut OpenCell) -> Result<Option<BoardInView>, Failure
 }
 
 impl TowardsBoard {
-    /// Views of the board where its scene says where it is, on free ways from here, and where the UR5 of the reference scene
-    /// begins. None of a real cell. The ways are checked when the arm goes there.
+    /// Views of the board if its scene states where it is, on free paths from here, and the start of the UR5 of the
+    /// reference scene. Empty for a real cell. The paths are checked when the arm goes there.
     pub fn all(cell: &mut OpenCell) -> Result<Vec<Self>, Failure> {
         let views = match board_in_view(cell)? {
             // A board out of reach has no views.

@@ -1,14 +1,14 @@
-//! What the thread of the window does for a frame, while everything else goes wrong or is hard at work.
+//! What the thread of the window does for a frame, while everything else fails or is busy.
 //!
 //!     cargo run --release -p handeye_app --example frame_budget [SECONDS]
 //!
 //! The first two lines are the same work without and with a recording for Rerun, and the last two with a viewer as well:
-//! one that reads, and one that is stopped (`rerun` on the `PATH`; left out without). `images/s` counts those that the
+//! one that reads, and one that is stopped (`rerun` on the `PATH`; skipped without). `images/s` counts those that the
 //! window got, `MB` is the memory of the program.
 //!
 //! Draws the whole window 60 times a second without a graphics card: events, panes, tessellation. Prints for each
-//! situation the median, the 99th percentile and the worst of the frames on the clock, what other threads take of the
-//! processor included, and how many shapes the last frame had.
+//! situation the median, the 99th percentile and the worst of the wall times of the frames, including processor time
+//! taken by other threads, and how many shapes the last frame had.
 
 mod window;
 
@@ -48,12 +48,12 @@ fn main() -> anyhow::Result<()> {
     );
 
     let cell = CellServer::start(CellConfig::new(Scene::reference()?))?;
-    // A cell at an address starts its simulation when it is told to; without passes there are no new images.
+    // A cell at an address starts its simulation on command; without passes there are no new images.
     let endpoint = cell.endpoint().parse()?;
     let mut starter = CellClient::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default())?;
     starter.arm().sim().start_simulation()?;
     let live = || CellSource::Address(cell.endpoint());
-    // In turns, so that what else the machine does falls on both.
+    // In turns, so that other load of the machine affects both.
     for round in 1..=2 {
         measure(&format!("live images, round {round}"), live(), duration, |_| {})?;
         recorded(&format!("the same, recorded, round {round}"), live(), duration, RerunChoice::Record, |_| {})?;
@@ -134,7 +134,7 @@ fn recorded(
     let warm_up = Duration::from_secs(3);
     while drawn.age() < duration + warm_up {
         drawn.draw();
-        // The first frames make fonts and connections; they are not what a user waits for.
+        // The first frames create fonts and connections; they are not what a user waits for.
         if drawn.age() < warm_up {
             drawn.times_ms.clear();
             continue;
@@ -158,7 +158,7 @@ fn recorded(
     Ok(())
 }
 
-/// A line to the server that carries so many bytes a second in each direction.
+/// A connection to the server that carries this many bytes per second in each direction.
 fn slow_line(server: &str) -> anyhow::Result<String> {
     let server = server.trim_start_matches("tcp://").to_owned();
     let listener = TcpListener::bind("127.0.0.1:0")?;
@@ -184,7 +184,7 @@ fn trickle(mut from: TcpStream, mut to: TcpStream) {
     }
 }
 
-/// A session of 1,000 captures of a made-up cell, which the solver takes up by itself.
+/// A session of 1,000 captures of a made-up cell, which the solver takes up automatically.
 fn thousand_views(app: &mut App) {
     let camera = Intrinsics::pinhole(640, 480, 589.37);
     let tip_from_camera: Pose<Tip, Camera> = Pose::from_translation_xyzw([0.05, 0.0, 0.0], [0.0, 0.0, 0.7, 0.7]);

@@ -1,8 +1,8 @@
-//! A port of this machine behind which something is served.
+//! A port of this machine with a service behind it.
 //!
-//! Whoever runs a program on this machine can connect, and so can every page that its browser shows. A door for this
-//! machine lets requests in that use a name of it ([`names`]). Every door holds a bounded number of connections, and
-//! gives up those on which nothing is asked or nothing is taken.
+//! Every program on this machine can connect, and so can every page in its browser. A door for this machine accepts
+//! requests that use a name of it ([`names`]). Every door holds a bounded number of connections, and closes those
+//! without requests or whose answers are not read.
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
@@ -31,33 +31,33 @@ use tower::ServiceExt as _;
 
 use super::names;
 
-/// What the head of a request, and what is to be sent before more of it is made, may take \[bytes\].
+/// Limit of the head of a request, and of pending data before more of an answer is produced \[bytes\].
 const BUFFER: usize = 64 * 1024;
 
-/// Requests at a time on one connection.
+/// Simultaneous requests on one connection.
 const STREAMS: u32 = 16;
 
-/// How often somebody who reads is asked whether he is still there, where the protocol has a way to ask.
+/// How often a reader is pinged, if the protocol supports it.
 const PING: Duration = Duration::from_secs(10);
 
 /// After the system has refused a connection, most likely for want of file descriptors.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// What is held for whom.
+/// The limits of a door.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// Connections at a time. A viewer has one, a browser up to six.
+    /// Simultaneous connections. A viewer has one, a browser up to six.
     pub connections: usize,
     /// How long a connection may be without a complete request.
     pub idle: Duration,
-    /// How long nothing may be taken of an answer.
+    /// How long an answer may remain unread.
     pub stalled: Duration,
-    /// How long the beginning of an answer may take, the rest of the request included.
+    /// How long the start of an answer may take, including the rest of the request.
     pub answer: Duration,
 }
 
 impl Limits {
-    /// For people and their viewers.
+    /// For users and their viewers.
     pub const USUAL: Self = Self {
         connections: 32,
         idle: Duration::from_secs(10),
@@ -66,7 +66,7 @@ impl Limits {
     };
 }
 
-/// A port that is listened at; closed, with all its connections, when this is dropped.
+/// A listening port; closed, with all its connections, when this is dropped.
 #[derive(Debug)]
 pub struct Door {
     address: SocketAddr,
@@ -74,7 +74,7 @@ pub struct Door {
 }
 
 impl Door {
-    /// Listens on a free port of 127.0.0.1 and gives to `routes` what is asked with a name of this machine.
+    /// Listens on a free port of 127.0.0.1 and passes requests under a name of this machine to `routes`.
     ///
     /// # Errors
     /// When there is no port.
@@ -83,8 +83,8 @@ impl Door {
         Self::at(here, runtime, limits, routes.layer(middleware::from_fn(by_our_name)))
     }
 
-    /// Listens at an address and gives everything that is asked to `routes`, which have to see to it who asks. A request
-    /// may become another protocol.
+    /// Listens at an address and passes all requests to `routes`, which have to check access. A request may be upgraded
+    /// to another protocol.
     ///
     /// # Errors
     /// When the address is not one of this machine or the port is taken.
@@ -123,7 +123,7 @@ impl Drop for Door {
 struct Activity {
     /// Requests that are being answered.
     requests: usize,
-    /// Whether the other side does not take what is sent.
+    /// Whether the peer does not read what is sent.
     blocked: bool,
 }
 
@@ -155,7 +155,7 @@ async fn listen(listener: TcpListener, limits: Limits, routes: Router) {
         while tasks.try_join_next().is_some() {}
         guests.retain(|guest| !guest.task.is_finished());
         if guests.len() >= limits.connections {
-            // Whoever waits longest without asking anything goes first, so that nobody is locked out by them.
+            // The longest idle connection is closed first, so that idle ones lock nobody out.
             let Some(idle) = guests.iter().position(|guest| guest.activity.borrow().is_idle()) else {
                 tracing::debug!("a viewer was not let in: {} are served already", guests.len());
                 continue;
@@ -168,7 +168,7 @@ async fn listen(listener: TcpListener, limits: Limits, routes: Router) {
     }
 }
 
-/// Serves a connection until it ends or is given up.
+/// Serves a connection until it ends or is closed.
 async fn attend(
     client: TcpStream,
     from: IpAddr,
@@ -176,7 +176,7 @@ async fn attend(
     activity: Arc<watch::Sender<Activity>>,
     routes: Router,
 ) {
-    // What is small and live should not wait for more.
+    // Small live data should not be delayed.
     let _set = client.set_nodelay(true).is_ok();
     let given_up = is_given_up(limits, activity.subscribe());
     let watched = Watched { client, activity: Arc::clone(&activity) };
@@ -187,7 +187,7 @@ async fn attend(
         let answered = tokio::time::timeout(limits.answer, routes.clone().oneshot(request));
         async move {
             let late = |_elapsed| Ok((StatusCode::REQUEST_TIMEOUT, "The request took too long.\n").into_response());
-            // A request is being answered until the last of the answer was made.
+            // A request counts as being answered until the end of the answer was produced.
             answered.await.unwrap_or_else(late).map(|response| {
                 response.map(|body| {
                     Body::new(body.map_frame(move |frame| {
@@ -215,7 +215,7 @@ async fn attend(
     }
 }
 
-/// Ends when a connection is worth waiting for no longer.
+/// Ends when a connection is no longer worth waiting for.
 async fn is_given_up(limits: Limits, mut activity: watch::Receiver<Activity>) {
     loop {
         let now = *activity.borrow_and_update();
@@ -223,7 +223,7 @@ async fn is_given_up(limits: Limits, mut activity: watch::Receiver<Activity>) {
         let patience = match now {
             Activity { blocked: true, .. } => limits.stalled,
             Activity { requests: 0, .. } => limits.idle,
-            // Something that is live is watched for as long as one likes.
+            // A live answer may last as long as the reader likes.
             _ => Duration::MAX,
         };
         match tokio::time::timeout(patience, changed).await {
@@ -238,7 +238,7 @@ async fn is_given_up(limits: Limits, mut activity: watch::Receiver<Activity>) {
 #[derive(Debug, Clone, Copy)]
 struct Peer(IpAddr);
 
-/// The address from which a request came.
+/// The address of the client of a request.
 pub fn asked_from(request: &Request) -> IpAddr {
     request.extensions().get::<Peer>().map_or(IpAddr::V4(Ipv4Addr::UNSPECIFIED), |peer| peer.0)
 }
@@ -259,7 +259,7 @@ impl Drop for Busy {
     }
 }
 
-/// A connection that notes when the other side does not take what is sent.
+/// A connection that notes when the peer does not read what is sent.
 struct Watched {
     client: TcpStream,
     activity: Arc<watch::Sender<Activity>>,

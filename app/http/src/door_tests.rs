@@ -18,7 +18,7 @@ fn runtime() -> Runtime {
     Builder::new_multi_thread().worker_threads(1).enable_all().build().expect("a thread")
 }
 
-/// A door that says hello.
+/// A door that answers hello.
 fn hello(runtime: &Runtime, limits: Limits) -> Door {
     Door::open(runtime.handle(), limits, Router::new().route("/", get("hello"))).expect("a port")
 }
@@ -29,7 +29,7 @@ fn connect(door: &Door) -> Socket {
     socket
 }
 
-/// What comes until there is this in it, or until the end.
+/// Reads until this text has arrived, or until the end.
 fn read_until(socket: &mut Socket, wanted: &str) -> String {
     let mut reported = Vec::new();
     let mut piece = [0; 4096];
@@ -80,7 +80,7 @@ fn a_connection_without_a_whole_request_is_given_up() {
     for begun in ["", "GET / HT", "PRI * HTTP/2.0\r\n\r\nSM", "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"] {
         let mut socket = connect(&door);
         socket.write_all(begun.as_bytes()).expect("sent");
-        // Reading ends because the connection does, long before the time of reading.
+        // Reading ends because the connection does, long before the read timeout.
         assert!(!read_until(&mut socket, "hello").contains("hello"), "{begun:?}");
     }
     let mut socket = connect(&door);
@@ -97,7 +97,7 @@ fn a_head_that_comes_letter_by_letter_has_no_longer_than_one_that_does_not_come(
     let mut socket = connect(&door);
     socket.set_read_timeout(Some(Duration::from_millis(20))).expect("set");
     let began = Instant::now();
-    // Every letter is in time; all of them are not.
+    // Each letter is in time; all of them together are not.
     socket.write_all(b"GET / HTTP/1.1\r\nX-Slow: ").expect("sent");
     loop {
         assert!(began.elapsed() < SOON, "it may go on for ever");
@@ -118,12 +118,12 @@ fn a_head_that_comes_letter_by_letter_has_no_longer_than_one_that_does_not_come(
 #[test]
 fn five_hundred_connections_that_ask_nothing_lock_nobody_out() {
     let runtime = runtime();
-    // They would be waited for without end: it is their number that is bounded.
+    // They would be waited for without end: their number is bounded instead.
     let door = hello(&runtime, Limits { idle: SOON, ..Limits::USUAL });
     let dribbling: Vec<Socket> = (0..500)
         .map(|_| {
             let mut socket = connect(&door);
-            // Those that were given up to make room are gone already.
+            // Those that were closed to make room are gone already.
             let _sent = socket.write_all(b"GET / HTTP/1.1\r\nHo").is_ok();
             socket
         })
@@ -134,7 +134,7 @@ fn five_hundred_connections_that_ask_nothing_lock_nobody_out() {
     }
     let is_open = |mut socket: &Socket| socket.read(&mut [0]).is_err_and(|error| error.kind() == ErrorKind::WouldBlock);
     let began = Instant::now();
-    // The last of them may still be on its way out.
+    // The last of them may still be closing.
     while dribbling.iter().filter(|socket| is_open(socket)).count() > Limits::USUAL.connections {
         assert!(began.elapsed() < SOON / 2, "more are held than there is room for");
         std::thread::yield_now();
@@ -145,7 +145,7 @@ fn five_hundred_connections_that_ask_nothing_lock_nobody_out() {
 fn those_who_are_served_are_not_given_up_for_those_who_are_not() {
     let runtime = runtime();
     let limits = Limits { connections: 3, idle: Duration::from_millis(200), ..Limits::USUAL };
-    // An answer that goes on, as a live recording does.
+    // An answer that continues, like a live recording.
     let (more, rest) = watch::channel(());
     let answer = move || {
         let mut rest = rest.clone();
@@ -164,7 +164,7 @@ fn those_who_are_served_are_not_given_up_for_those_who_are_not() {
     let mut watching = connect(&door);
     watching.write_all(HONEST.as_bytes()).expect("sent");
     assert!(read_until(&mut watching, "first").contains("first"));
-    // Longer than a connection without a request has.
+    // Longer than a connection may be without a request.
     let mut idle = connect(&door);
     assert_eq!(read_until(&mut idle, "first"), "");
     // And more of them than there is room for.
@@ -181,12 +181,12 @@ fn those_who_are_served_are_not_given_up_for_those_who_are_not() {
 fn an_answer_that_nobody_takes_is_given_up() {
     let runtime = runtime();
     let limits = Limits { stalled: Duration::from_millis(200), idle: SOON, ..Limits::USUAL };
-    // More than the system keeps for somebody who does not read.
+    // More than the system buffers for a client that does not read.
     let routes = Router::new().route("/", get(|| async { vec![0; 64 << 20] }));
     let door = Door::open(runtime.handle(), limits, routes).expect("a port");
     let mut socket = connect(&door);
     socket.write_all(HONEST.as_bytes()).expect("sent");
-    // Sending goes on being possible until the connection is given up.
+    // Sending remains possible until the connection is closed.
     let began = Instant::now();
     socket.set_nonblocking(true).expect("set");
     while socket.write(b"\n").map_or_else(|error| error.kind() == ErrorKind::WouldBlock, |_| true) {

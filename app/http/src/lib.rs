@@ -1,8 +1,8 @@
 //! What is served over HTTP: the page of the workbench, and the recordings that Rerun's viewers read.
 //!
-//! What is asked for and answered is axum's; a [`door::Door`] serves its routes. `axum::serve` would hold any number of
-//! connections, for as long as somebody likes who asks nothing or takes nothing of an answer; so connections are a door's own.
-//! Never depends on another crate of the workbench.
+//! Requests and responses are axum's; a [`door::Door`] serves its routes. `axum::serve` would hold any number of connections,
+//! for as long as a client likes that sends no request or reads no answer; so a door handles connections itself. Never depends
+//! on another crate of the workbench.
 //!
 //! ```
 //! use axum::{Router, routing::get};

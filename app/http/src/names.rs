@@ -1,8 +1,8 @@
-//! Who is asked, and by whom: names of this machine and nothing else.
+//! Host names and origins of requests: names of this machine and nothing else.
 //!
-//! A page from elsewhere can have its own name lead to 127.0.0.1 (DNS rebinding). The browser then lets it read what it
-//! gets from here, because it takes both for one site; only the name in the request tells. An address in numbers cannot be
-//! given another meaning.
+//! A foreign page can make its own name resolve to 127.0.0.1 (DNS rebinding). The browser then lets it read responses from
+//! here, because it takes both for one site; only the name in the request reveals it. A numeric address cannot be
+//! redirected.
 
 use std::net::IpAddr;
 
@@ -10,14 +10,14 @@ use axum::http::header::{HOST, HeaderValue, ORIGIN};
 use axum::http::uri::Authority;
 use axum::http::{Request, Uri};
 
-/// What somebody who uses another name is told.
+/// The response to a request under another name.
 pub const REFUSAL: &str = "This is served for this machine only: ask for it as 127.0.0.1 or localhost, and from a page of \
                            this machine.\n";
 
-/// Whether a request asks for this machine by one of its own names and comes from no page of another one.
+/// Whether a request uses one of this machine's own names and does not come from a page of another machine.
 pub fn are_of_this_machine<B>(request: &Request<B>) -> bool {
     let headers = request.headers();
-    // HTTP/2 and proxies say the name in the address, HTTP/1 in a header; whoever says both has to be right in both.
+    // HTTP/2 and proxies put the name in the address, HTTP/1 in a header; if both are present both have to be right.
     let address = request.uri().authority().map(|authority| is_here(authority.host()));
     let asked: Vec<bool> = address.into_iter().chain(headers.get_all(HOST).iter().map(is_host_here)).collect();
     !asked.is_empty() && asked.into_iter().all(|here| here) && headers.get_all(ORIGIN).iter().all(is_origin_here)
@@ -28,7 +28,7 @@ fn is_host_here(host: &HeaderValue) -> bool {
     authority.is_some_and(|authority| !authority.as_str().contains('@') && is_here(authority.host()))
 }
 
-/// A page says where it is from; one that will not say (`null`) may be from anywhere.
+/// A page sends its origin; `null` may be from anywhere.
 fn is_origin_here(origin: &HeaderValue) -> bool {
     let uri = origin.to_str().ok().and_then(|origin| origin.parse::<Uri>().ok());
     uri.is_some_and(|uri| matches!(uri.scheme_str(), Some("http" | "https")) && uri.host().is_some_and(is_here))

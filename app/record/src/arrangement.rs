@@ -1,8 +1,8 @@
-//! The layouts of viewers as messages, each made once in a program.
+//! The layouts of viewers as messages, each created once per program run.
 //!
-//! The library makes a blueprint in a recording that refers to itself and never ends: two threads and its memory stay for
-//! every [`Blueprint`](rerun::blueprint::Blueprint) that is sent. So a layout is sent to a recording of ours once, and its
-//! messages are kept for all sessions.
+//! The library creates a blueprint in a recording that refers to itself and never ends: two threads and its memory leak
+//! for every [`Blueprint`](rerun::blueprint::Blueprint) that is sent. So a layout is sent to a recording of ours once, and
+//! its messages are kept for all sessions.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -25,17 +25,17 @@ pub struct Arrangement {
     layout: Vec<LogMsg>,
     /// The entities of the views in 3D.
     spaces: Vec<String>,
-    /// Has viewers take it.
+    /// Activates it in viewers.
     activation: Vec<LogMsg>,
 }
 
-/// What was made so far.
+/// What was created so far.
 static MADE: Mutex<BTreeMap<Arranged, Arc<Arrangement>>> = Mutex::new(BTreeMap::new());
 
 /// The layout.
 ///
 /// # Errors
-/// When the library cannot make it.
+/// When the library cannot create it.
 pub fn of(arranged: Arranged) -> Result<Arc<Arrangement>, RecordingStreamError> {
     let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(arrangement) = made.get(&arranged) {
@@ -59,14 +59,14 @@ impl Arrangement {
         Ok(Self { layout, spaces, activation })
     }
 
-    /// Has the views in 3D look at all of it: what a viewer chooses by itself is fitted to what is there when it opens, and to
-    /// points far behind the cell.
+    /// Fits the views in 3D to all of it: the view that a viewer chooses by itself is fitted to what is there when it opens,
+    /// and to points far behind the cell.
     fn frame(&self, stream: &RecordingStream, extent: &Extent) -> Result<(), RecordingStreamError> {
         let Some(LogMsg::SetStoreInfo(store)) = self.layout.first() else { return Ok(()) };
         let id = store.info.store_id.recording_id().clone();
         let builder = RecordingStreamBuilder::new(APPLICATION_ID).recording_id(id).blueprint();
         let messages = messages(builder, |stream| {
-            // The time line of everything in a layout; of rows at one time the last counts.
+            // The time line of everything in a layout; among rows at one time the last counts.
             stream.set_time_sequence("blueprint", 0);
             for space in &self.spaces {
                 stream.log_serialized_batches(format!("{space}/EyeControls3D"), false, eye(extent))?;
@@ -79,10 +79,10 @@ impl Arrangement {
         Ok(())
     }
 
-    /// Has viewers of a recording take it, looking at this; with the layout itself the first time.
+    /// Sends it to viewers of a recording, with this extent in view; including the layout itself the first time.
     ///
     /// # Errors
-    /// When the library cannot say where the eye is.
+    /// When the library cannot encode where the eye is.
     pub fn send(
         &self,
         stream: &RecordingStream,
@@ -99,7 +99,7 @@ impl Arrangement {
     }
 }
 
-/// What is logged to a recording of its own, which ends with that.
+/// The messages that are logged to a temporary recording.
 fn messages(
     builder: RecordingStreamBuilder,
     log: impl FnOnce(&RecordingStream) -> Result<(), RecordingStreamError>,
@@ -126,7 +126,7 @@ fn space(message: &LogMsg) -> Option<String> {
     is_space.then(|| chunk.entity_path().to_string())
 }
 
-/// Where the eye of a view is and what it looks at, as the archetype `EyeControls3D` of viewers has it.
+/// Where the eye of a view is and what it looks at, as in the archetype `EyeControls3D` of viewers.
 fn eye(extent: &Extent) -> impl Iterator<Item = SerializedComponentBatch> {
     let part = |component: &'static str, at: Point3<f64>| {
         let [x, y, z]: [f32; 3] = at.coords.map(|metres| metres as f32).into();

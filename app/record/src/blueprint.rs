@@ -10,12 +10,12 @@ use rerun::blueprint::{
 use super::scene::paths;
 use handeye_workbench::model::Step;
 
-/// What is shown. Nothing stands in front that has nothing to show.
+/// What is shown. Nothing is in front that has nothing to show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Arranged {
     /// The step of the workflow.
     pub step: Step,
-    /// Whether the camera stands beside the robot, and not on its tip.
+    /// Whether the camera is next to the robot (eye to hand), and not on its tip.
     pub is_beside: bool,
     /// Whether there are joints.
     pub has_joints: bool,
@@ -41,7 +41,7 @@ fn capture(arranged_for: Arranged) -> Blueprint {
     arranged(cell("Cell", &[]), right.into(), paths::SIM_TIMELINE)
 }
 
-/// Capture by capture: how the answer came about.
+/// Capture by capture: how the answer was obtained.
 fn solve(arranged_for: Arranged) -> Blueprint {
     let images = [live_image("Image of the capture", arranged_for), selected_image()];
     let right = Vertical::new([
@@ -57,7 +57,7 @@ fn solve(arranged_for: Arranged) -> Blueprint {
     arranged(cell, right.into(), paths::CAPTURE_TIMELINE)
 }
 
-/// Where the calibration puts the board, against where it is seen.
+/// Where the calibration predicts the board, compared with where it is seen.
 fn verify(arranged_for: Arranged) -> Blueprint {
     let images = [live_image("Prediction in the live image", arranged_for), selected_image()];
     let right = Vertical::new([
@@ -87,9 +87,9 @@ fn arranged(left: ContainerLike, right: ContainerLike, timeline: &str) -> Bluepr
         .with_selection_panel(SelectionPanel::from_state(PanelState::Collapsed))
 }
 
-/// Everything with a place, without what the step does not need.
+/// Everything with a place, except what the step does not need.
 fn cell(name: &str, without: &[&str]) -> ContainerLike {
-    // The points that a viewer makes of a depth image reach to the far plane, and hide the arm in front of them.
+    // The points that a viewer derives from a depth image reach to the far plane, and hide the arm in front of them.
     let depths = LENSES.map(|mode| format!("- /{}/{}", lens(mode), paths::DEPTH));
     let contents =
         ["+ $origin/**", "- /plots/**", "- /selected/**"].iter().chain(without).map(|query| (*query).to_owned());
@@ -103,14 +103,14 @@ fn lens(mode: Mode) -> String {
     paths::below(paths::camera(mode), paths::LENS)
 }
 
-/// The live image, of the camera on the tip or beside the robot.
+/// The live image, of the camera on the tip or next to the robot (eye to hand).
 fn live_image(name: &str, Arranged { is_beside, .. }: Arranged) -> ContainerLike {
     let mode = if is_beside { Mode::EyeToHand } else { Mode::EyeInHand };
     let no_depth = format!("- /{}/{}", lens(mode), paths::DEPTH);
     Spatial2DView::new(name).with_origin(lens(mode)).with_contents(["+ $origin/**".to_owned(), no_depth]).into()
 }
 
-/// What the robot does, where that is known, and what was reported.
+/// What the robot does, if that is known, and what was reported.
 fn joints_and_log(Arranged { has_joints, .. }: Arranged) -> impl Iterator<Item = ContainerLike> {
     let joints = has_joints.then(|| plot("Joints", paths::PLOT_JOINTS));
     joints.into_iter().chain([log()])

@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-/// The system says within this that there is none. A program that goes on has become the browser itself.
+/// The system reports within this time if there is no browser. A program that keeps running is the browser itself.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Has the system show a page; whether there is a browser that does, as far as the system knows.
+/// Makes the system show a page; whether there is a browser that does, as far as the system knows.
 pub fn open(url: &str) -> bool {
     if std::env::var_os("DISPLAY").is_none() && std::env::var_os("WAYLAND_DISPLAY").is_none() {
         // Some systems would start a browser in the terminal.

@@ -1,4 +1,4 @@
-//! The option `--rerun`: where the recording goes and how it is looked at.
+//! The option `--rerun`: where the recording goes and how it is viewed.
 
 use std::path::PathBuf;
 use std::str::FromStr as _;
@@ -6,7 +6,7 @@ use std::str::FromStr as _;
 /// Where the recording goes.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub enum RerunChoice {
-    /// Into a file beside the session, where there is a session; a viewer is opened when somebody asks for it.
+    /// Into a file next to the session, if there is a session; a viewer is opened on request.
     #[default]
     Record,
     /// The native viewer is opened as well.
@@ -15,13 +15,13 @@ pub enum RerunChoice {
     Web,
     /// It also goes to a viewer or proxy that runs already.
     Connect(String),
-    /// Into this file instead of one beside the session.
+    /// Into this file instead of one next to the session.
     Save(PathBuf),
-    /// There is none.
+    /// Nothing is recorded.
     Off,
 }
 
-/// What `--rerun` was given cannot be used.
+/// The value of `--rerun` cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 pub enum ChoiceError {
     /// No such word.
@@ -48,10 +48,10 @@ pub enum ChoiceError {
 }
 
 impl RerunChoice {
-    /// From the words after `--rerun`, joined by a blank.
+    /// From the words after `--rerun`, joined by a space.
     ///
     /// # Errors
-    /// [`ChoiceError`], which says what to write instead.
+    /// [`ChoiceError`], which states what to write instead.
     pub fn parse(words: &str) -> Result<Self, ChoiceError> {
         let (word, rest) = words.split_once(' ').unwrap_or((words, ""));
         match (word, rest) {

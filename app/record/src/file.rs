@@ -4,13 +4,13 @@ use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A file is not continued with live entries beyond this. What lasts is a fraction of it.
+/// A file is not continued with live entries beyond this size. Lasting entries are a fraction of it.
 pub const MAX_LIVE_BYTES: u64 = 512 * 1024 * 1024;
 
 /// Makes an empty file in a folder, under a name that is not taken: `recording.rrd`, `recording-2.rrd`, ….
 ///
 /// # Errors
-/// When none can be made there.
+/// When none can be created there.
 pub fn create_beside(folder: &Path) -> io::Result<PathBuf> {
     let mut number = 1;
     loop {
@@ -24,10 +24,10 @@ pub fn create_beside(folder: &Path) -> io::Result<PathBuf> {
     }
 }
 
-/// Makes the file that was asked for by name. One that is there is replaced, as with every file that is named.
+/// Creates the requested file. An existing one is replaced, as with every file that is named.
 ///
 /// # Errors
-/// When it cannot be made.
+/// When it cannot be created.
 pub fn create_named(path: &Path) -> io::Result<()> {
     File::create(path).map(drop)
 }

@@ -1,4 +1,4 @@
-//! What lasts: entries in their order, of which a newer one may make an older one pointless.
+//! What lasts: entries in their order; a newer one may make an older one obsolete.
 
 use std::collections::VecDeque;
 use std::mem::discriminant;
@@ -21,9 +21,9 @@ const TRAIL_STEP_S: f64 = 0.2;
 /// A recording: what its streams have in common.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Recording {
-    /// By which viewers tell that streams belong together.
+    /// By which viewers recognize streams that belong together.
     pub id: String,
-    /// For people.
+    /// For display.
     pub name: String,
     /// The folder of the session, once there is one.
     pub folder: Option<PathBuf>,
@@ -32,9 +32,9 @@ pub struct Recording {
 /// Something to write.
 #[derive(Debug, Clone)]
 pub enum Item {
-    /// From here on it is another recording.
+    /// From here on it is a different recording.
     Begin(Recording),
-    /// It has another name now.
+    /// Its name changes to this.
     Name(String),
     Entry(Entry),
 }
@@ -44,20 +44,20 @@ pub fn is_live(entry: &Entry) -> bool {
     matches!(entry, Entry::Robot { .. } | Entry::Image { .. } | Entry::Detection(_) | Entry::Tracked(_))
 }
 
-/// Entries that last. The list stays short whatever comes: a newer document, selection or step takes the place of the
-/// older one, and so does a newer look at the same capture.
+/// Entries that last. The list stays short in any case: a newer document, selection or step replaces the older one, and
+/// so does a newer detection in the same capture.
 #[derive(Debug, Clone, Default)]
 pub struct Lasting {
     items: VecDeque<Item>,
 }
 
 impl Lasting {
-    /// Takes in what is to come after everything else.
+    /// Adds what comes after everything else.
     pub fn push(&mut self, item: Item) {
         self.items.push_back(item);
     }
 
-    /// Takes in an entry.
+    /// Adds an entry.
     pub fn put(&mut self, entry: Entry) {
         // What belongs to an earlier recording is not touched.
         let begin = self.items.iter().rposition(|item| matches!(item, Item::Begin(_))).map_or(0, |at| at + 1);
@@ -86,7 +86,7 @@ impl Lasting {
         self.items.push_back(Item::Entry(entry));
     }
 
-    /// Drops the oldest of a kind when there are as many as there may be.
+    /// Drops the oldest of a kind if the limit is reached.
     fn make_room(&mut self, entry: &Entry, limit: usize) {
         let alike = |item: &Item| matches!(item, Item::Entry(other) if discriminant(other) == discriminant(entry));
         if limit < usize::MAX
@@ -107,13 +107,13 @@ impl Lasting {
         self.items.iter()
     }
 
-    /// Keeps what is true of every recording: the cell, and what the window shows.
+    /// Keeps what applies to every recording: the cell, and what the window shows.
     pub fn begin_another(&mut self) {
         self.items.retain(|item| matches!(item, Item::Entry(Entry::Cell(_) | Entry::KeepOut { .. } | Entry::Step(_))));
     }
 }
 
-/// Whether an entry makes an older one pointless.
+/// Whether an entry makes an older one obsolete.
 fn replaces(entry: &Entry, older: &Entry) -> bool {
     match (entry, older) {
         (Entry::Observed { id, .. }, Entry::Observed { id: other, .. }) => id == other,
@@ -145,7 +145,7 @@ impl Trail {
     /// Takes in a state of the robot, if it is not too close to the one before.
     pub fn put(&mut self, entry: &Entry) {
         let Entry::Robot { sim_time_s, .. } = entry else { return };
-        // Simulated time that jumps back is that of another run.
+        // Simulated time that jumps back belongs to another run.
         if (self.last_s..self.last_s + self.step_s).contains(sim_time_s) {
             return;
         }

@@ -10,12 +10,12 @@
 //! | `rerun-viewer` | a server of ours for viewers, or a viewer elsewhere | everything, as fast as the viewer reads |
 //!
 //! What lasts (captures, calibrations, messages) is kept for a viewer that is opened later. What is live (images, the
-//! robot) is only of interest while it is new: what cannot be written in time is left out and counted.
+//! robot) is only of interest while it is new: what cannot be written in time is dropped and counted.
 //! `docs/reference/rerun_viewers.md` has the bounds.
 //!
 //! Depends on `handeye_workbench` for what is recorded, implements its
 //! [`Recording`](handeye_workbench::recording::Recording), and is the only crate that knows Rerun. Never depends on egui or a
-//! window: [`record`] has any [`App`](handeye_workbench::app::App) recorded, and a program without one notes by itself.
+//! window: [`record`] records any [`App`](handeye_workbench::app::App), and a program without one notes its own entries.
 //!
 //! ```
 //! use std::sync::Arc;
@@ -64,5 +64,5 @@ pub use recorder::{Recorder, RecorderOptions, WebViewer, record};
 pub use serving::Relay;
 pub use viewer::ViewerRequest;
 
-/// Under which viewers keep layouts and recordings of this program.
+/// The name under which viewers keep layouts and recordings of this program.
 const APPLICATION_ID: &str = "handeye-workbench";

@@ -13,13 +13,13 @@ use handeye_workbench::text::Text;
 /// Its name.
 const PROGRAM: &str = "rerun";
 
-/// How long it may take to say its version. A Python that starts for the first time takes seconds.
+/// How long it may take to report its version. A Python that starts for the first time takes seconds.
 const PATIENCE: Duration = Duration::from_secs(15);
 
-/// Between two looks at a program that runs.
+/// Between two checks of a running program.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Memory that the viewer may use before it forgets the oldest.
+/// Memory that the viewer may use before it drops the oldest data.
 const VIEWER_MEMORY: &str = "25%";
 
 /// Finds a viewer on the `PATH` that understands what this program sends.
@@ -89,7 +89,7 @@ pub fn start(program: &Path, url: &str) -> io::Result<Child> {
     // Without `--connect` the viewer would open a port of its own to the whole network.
     viewer.args(["--connect", url]);
     viewer.args(["--hide-welcome-screen", "--memory-limit", VIEWER_MEMORY]).stdout(Stdio::null());
-    // Ctrl-C in the terminal is meant for this program alone.
+    // Ctrl-C in the terminal is meant for this program only.
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut viewer, 0);
     viewer.spawn()
@@ -102,10 +102,11 @@ fn command(program: &Path) -> Command {
     command
 }
 
-/// Waits until a program ends, for so long, or until there is no reason to wait now; `None` when it still runs.
+/// Waits until a program ends, for at most this long, or until there is no more reason to wait; `None` when it still
+/// runs.
 ///
 /// # Errors
-/// When the system does not know.
+/// When the system cannot tell.
 pub fn wait(child: &mut Child, patience: Duration, give_up: impl Fn() -> bool) -> io::Result<Option<ExitStatus>> {
     let began = Instant::now();
     loop {

@@ -1,20 +1,20 @@
-//! How much of what is live is written, and where to.
+//! How much of the live entries is written, and where to.
 
 use std::time::Duration;
 
 use super::queue::{Rate, Rates};
 
-/// How much of what is live is written.
+/// How much of the live entries is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pace {
-    /// What a person can see, and in a file less: for a window that is open all day.
+    /// What can be perceived, and less in a file: for a window that is open all day.
     Live,
     /// Everything: for a command that ends.
     Everything,
 }
 
 impl Pace {
-    /// How much of it goes to a file.
+    /// How much of them goes to a file.
     pub(super) fn for_file(self) -> Rates {
         let every = |millis| Rate::newest_every(Duration::from_millis(millis));
         match self {
@@ -29,7 +29,7 @@ impl Pace {
         }
     }
 
-    /// How much of it goes to a viewer.
+    /// How much of them goes to a viewer.
     pub(super) fn for_viewer(self) -> Rates {
         let every = |millis| Rate::newest_every(Duration::from_millis(millis));
         match self {

@@ -13,7 +13,7 @@ use handeye_wording::text;
 use handeye_workbench::model::Severity;
 use handeye_workbench::recording::Entry;
 
-/// How often a file is looked after.
+/// How often a file is checked.
 const LOOK: Duration = Duration::from_secs(2);
 
 /// Writes what is in a queue, until that ends.
@@ -22,7 +22,7 @@ pub struct Pump {
     target: Target,
     reports: Arc<Reports>,
     stream: Option<Stream>,
-    /// Something was written since the file was looked after.
+    /// Something was written since the file was checked.
     touched: bool,
     looked: Instant,
     failed: bool,
@@ -48,7 +48,7 @@ impl Pump {
                 Next::Live(entry) => {
                     self.write(|stream| stream.write_live(&entry));
                     if matches!(entry, Entry::Image { .. }) && matches!(self.target, Target::Viewers { .. }) {
-                        // Waiting here, and not in buffers of the library, keeps memory short and images new.
+                        // Waiting here, and not in buffers of the library, keeps memory use low and images new.
                         self.flush();
                     }
                 }
@@ -61,7 +61,7 @@ impl Pump {
     }
 
     fn begin(&mut self, recording: &Recording) {
-        // The file before is completed first.
+        // The previous file is completed first.
         self.stream = None;
         self.failed = false;
         match Stream::open(&self.target, recording) {

@@ -1,4 +1,4 @@
-//! What a thread that writes has yet to write. Whoever puts something in waits only where nothing may be left out.
+//! What a writing thread has yet to write. A sender waits only if nothing may be dropped.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -7,28 +7,28 @@ use std::time::{Duration, Instant};
 use super::lasting::{Item, Lasting};
 use handeye_workbench::recording::Entry;
 
-/// A writer that is later than this has left something out because it was slow, and not because so much was not wanted.
+/// A writer that is later than this has dropped entries because it was slow, and not because they were not wanted.
 const SLOW: Duration = Duration::from_millis(500);
 
-/// A writer that takes nothing for so long hangs, and is waited for no longer.
+/// A writer that takes nothing for this long hangs, and is no longer waited for.
 const STUCK: Duration = Duration::from_secs(10);
 
 /// How much of one kind of live entries is written.
 #[derive(Debug, Clone, Copy)]
 pub struct Rate {
-    /// Entries that may wait; a newer one takes the place of the oldest.
+    /// Entries that may wait; a newer one replaces the oldest.
     pub capacity: usize,
-    /// Least time between two that are written.
+    /// Minimum time between two that are written.
     pub period: Duration,
 }
 
 impl Rate {
-    /// The newest one, so often.
+    /// The newest one, once per period.
     pub const fn newest_every(period: Duration) -> Self {
         Self { capacity: 1, period }
     }
 
-    /// All of them, as far as so many may wait.
+    /// All of them, as long as at most this many wait.
     pub const fn all(capacity: usize) -> Self {
         Self { capacity, period: Duration::ZERO }
     }
@@ -45,20 +45,20 @@ pub struct Rates {
     pub detection: Rate,
     /// The board as it is tracked.
     pub tracked: Rate,
-    /// Whether whoever puts something in waits for the writer, so that everything is written, in its order.
+    /// Whether senders wait for the writer, so that everything is written, in its order.
     pub waits: bool,
 }
 
-/// What is next for the thread that writes.
+/// The next work of the writing thread.
 #[derive(Debug)]
 pub enum Next {
     /// Something that lasts.
     Lasting(Item),
     /// Something live.
     Live(Entry),
-    /// Nothing for as long as was asked.
+    /// Nothing within the requested time.
     Idle,
-    /// Nothing, for ever.
+    /// Nothing, ever again.
     End,
 }
 
@@ -66,7 +66,7 @@ pub enum Next {
 pub struct Queue {
     state: Mutex<State>,
     bell: Condvar,
-    /// Rung when the writer has taken something, for those who wait with more.
+    /// Notified when the writer has taken something, for senders that wait.
     taken: Condvar,
     waits: bool,
 }
@@ -102,7 +102,7 @@ impl Queue {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Puts an entry in.
+    /// Adds an entry.
     pub fn put(&self, entry: Entry) {
         let mut state = self.state();
         if self.waits {
@@ -119,22 +119,22 @@ impl Queue {
         };
         drop(state);
         self.bell.notify_one();
-        // An image is megabytes: it is freed without the lock.
+        // An image is megabytes: it is freed without holding the lock.
         drop(left_out);
     }
 
-    /// Puts in what comes after everything else that lasts.
+    /// Adds what comes after everything else that lasts.
     pub fn push(&self, item: Item) {
         self.state().lasting.push(item);
         self.bell.notify_one();
     }
 
-    /// Live entries so far that were left out because the writer was late.
+    /// Live entries so far that were dropped because the writer was late.
     pub fn left_out(&self) -> u64 {
         self.state().left_out
     }
 
-    /// Entries that wait.
+    /// Number of waiting entries.
     #[cfg(test)]
     pub(crate) fn len(&self) -> usize {
         let state = self.state();
@@ -148,7 +148,7 @@ impl Queue {
         self.taken.notify_all();
     }
 
-    /// Waits for what is next, or for so long.
+    /// Waits for the next work, for at most this long.
     pub fn next(&self, patience: Duration) -> Next {
         let end = Instant::now() + patience;
         let mut state = self.state();
@@ -180,7 +180,7 @@ impl State {
         self.lasting.iter().next().is_none() && self.lanes.iter().all(|lane| lane.waiting.is_empty())
     }
 
-    /// What had to make room.
+    /// Returns what was dropped to make room.
     fn put_live(&mut self, lane: usize, entry: Entry) -> Option<(u64, Entry)> {
         self.arrivals += 1;
         let Lane { rate, waiting, due } = &mut self.lanes[lane];

@@ -1,4 +1,4 @@
-//! What the application notes with. Noting never waits: it puts the entry into queues of bounded length.
+//! The application's end of the recording. Noting never waits: it puts the entry into bounded queues.
 
 use std::io;
 use std::sync::Arc;
@@ -14,16 +14,16 @@ use handeye_workbench::model::RerunState;
 use handeye_workbench::recording::{Entry, Recording};
 use handeye_workbench::worker::Waker;
 
-/// How long the end of the program waits for what is still to be written.
+/// How long the end of the program waits for pending writes.
 const DEADLINE: Duration = Duration::from_secs(2);
 
 /// Where the web viewer is shown.
 pub enum WebViewer {
     /// In the browser of this machine, which is opened.
     Here,
-    /// On a port of its own; who wants to look opens a browser.
+    /// On a port of its own; the user opens a browser to look.
     AtAddress,
-    /// By somebody who serves it; no viewer is opened on this machine.
+    /// By another server; no viewer is opened on this machine.
     Relayed(Arc<Relay>),
 }
 
@@ -32,7 +32,7 @@ pub struct RecorderOptions {
     pub choice: RerunChoice,
     /// How much.
     pub pace: Pace,
-    /// Whether a file is written beside the session when nothing else is reported.
+    /// Whether a file is written next to the session if nothing else is chosen.
     pub beside_session: bool,
     /// Where the web viewer is shown.
     pub web: WebViewer,
@@ -40,10 +40,10 @@ pub struct RecorderOptions {
     pub waker: Waker,
 }
 
-/// Has everything recorded that happens in an application.
+/// Records everything that happens in an application.
 ///
 /// # Errors
-/// When the file that was named cannot be made, or the system has no more threads.
+/// When the named file cannot be created, or the system cannot start more threads.
 pub fn record(app: &mut App, choice: RerunChoice, web: WebViewer) -> io::Result<()> {
     if choice != RerunChoice::Off {
         let waker = Arc::clone(app.waker());
@@ -53,7 +53,7 @@ pub fn record(app: &mut App, choice: RerunChoice, web: WebViewer) -> io::Result<
     Ok(())
 }
 
-/// The recording of a program. Off, it costs nothing.
+/// The recording of a program. If off, it costs nothing.
 #[derive(Default)]
 pub struct Recorder {
     shared: Option<Arc<Shared>>,
@@ -68,7 +68,7 @@ impl Recorder {
     /// Begins to record.
     ///
     /// # Errors
-    /// When the file that was named cannot be made, or the system has no more threads.
+    /// When the named file cannot be created, or the system cannot start more threads.
     pub fn start(options: RecorderOptions) -> io::Result<Self> {
         let RecorderOptions { choice, pace, beside_session, web, waker } = options;
         if choice == RerunChoice::Off {
@@ -87,12 +87,12 @@ impl Recorder {
         Ok(recorder)
     }
 
-    /// Whether anything is recorded. Where nothing is, entries need not be made.
+    /// Whether anything is recorded. If not, entries need not be created.
     pub fn is_on(&self) -> bool {
         self.shared.is_some()
     }
 
-    /// Opens a viewer; how that goes is reported.
+    /// Opens a viewer; the outcome is reported.
     pub(crate) fn open(&self, request: ViewerRequest) {
         if let Some(shared) = &self.shared {
             viewer::open(shared, request);

@@ -135,7 +135,7 @@ fn a_named_file_that_cannot_be_made_is_an_error_at_once() {
     assert!(Recorder::start(options).is_err());
 }
 
-/// A sink that takes nothing now until it is let go.
+/// A sink that blocks until it is released.
 #[derive(Default)]
 struct Gate {
     open: Mutex<bool>,

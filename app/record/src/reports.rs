@@ -1,4 +1,4 @@
-//! What the threads of the recording tell the window.
+//! What the threads of the recording report to the window.
 
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -12,7 +12,7 @@ use handeye_workbench::{messages, recording};
 /// Events that wait for the window.
 const MAX_EVENTS: usize = 32;
 
-/// What the threads tell the window.
+/// Reports of the threads to the window.
 pub struct Reports {
     inner: Mutex<Inner>,
     waker: Waker,
@@ -27,7 +27,7 @@ struct Inner {
 }
 
 impl Reports {
-    /// Nothing to tell.
+    /// Nothing to report.
     pub fn new(waker: Waker) -> Self {
         let state = RerunState { on: true, ..RerunState::default() };
         Self { inner: Mutex::new(Inner { state, ..Inner::default() }), waker }
@@ -52,7 +52,7 @@ impl Reports {
     /// A viewer is being opened, unless there is one.
     ///
     /// # Errors
-    /// How it is looked at already.
+    /// How it is viewed already.
     pub fn begin_opening(&self) -> Result<(), ViewerState> {
         let mut inner = self.inner();
         match &inner.state.viewer {
@@ -80,12 +80,12 @@ impl Reports {
         (self.waker)();
     }
 
-    /// The state with so many entries left out.
+    /// The state with this many dropped entries.
     pub fn state(&self, left_out: u64) -> RerunState {
         RerunState { left_out, ..self.inner().state.clone() }
     }
 
-    /// Hands over what the window does not know yet, the state first; so many entries were left out.
+    /// Hands over what the window does not know yet, the state first; this many entries were dropped.
     pub fn drain(&self, left_out: u64, absorb: &mut dyn FnMut(Event)) {
         let now = self.state(left_out);
         let mut inner = self.inner();

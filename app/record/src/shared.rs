@@ -1,4 +1,4 @@
-//! What the threads of a recording share: what was noted, who writes it, and the viewers that are open.
+//! What the threads of a recording share: what was noted, the writers, and the open viewers.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -24,7 +24,7 @@ use handeye_workbench::worker::Started;
 /// What the threads of a recording share.
 pub(super) struct Shared {
     state: Mutex<State>,
-    /// What is told to the window.
+    /// What is reported to the window.
     pub reports: Arc<Reports>,
     viewers: Mutex<Viewers>,
     /// Where the web viewer is shown.
@@ -42,7 +42,7 @@ struct State {
     trail: Trail,
     file: Option<Writer>,
     viewer: Option<Writer>,
-    /// Writers that were told to end.
+    /// Writers that were requested to end.
     ending: Vec<Writer>,
 }
 
@@ -56,12 +56,12 @@ struct Writer {
 #[derive(Default)]
 pub(super) struct Viewers {
     pub server: Option<Server>,
-    /// Whether the page of the web viewer is wanted: the server then goes on when the native viewer is closed.
+    /// Whether the page of the web viewer is wanted: the server then continues when the native viewer is closed.
     pub on_page: bool,
 }
 
 impl Shared {
-    /// Nothing was noted yet, and nobody writes.
+    /// Nothing was noted yet, and there is no writer.
     pub fn new(reports: Reports, pace: Pace, web: WebViewer, beside_session: bool) -> Self {
         let state = State {
             recording: Recording { id: new_id(0), name: "Handeye".to_owned(), folder: None },
@@ -139,7 +139,7 @@ impl Shared {
         let first = state.recording.folder.replace(folder.to_path_buf()).is_none();
         state.recording.name.clone_from(&name);
         if first {
-            // What was there before the first capture belongs to it as well.
+            // What came before the first capture belongs to it as well.
             for writer in state.file.iter().chain(&state.viewer) {
                 writer.queue.push(Item::Name(name.clone()));
             }
@@ -170,7 +170,7 @@ impl Shared {
         if state.file.is_none() { Err(io::Error::other("the system has no more threads")) } else { Ok(()) }
     }
 
-    /// Has everything written to viewers from here on, and first what lasts of what was before.
+    /// Writes everything to viewers from here on, starting with the lasting entries of what came before.
     pub fn write_to_viewers(&self, target: Target) {
         let queue = Arc::new(Queue::new(&self.pace.for_viewer()));
         let mut state = self.state();
@@ -182,7 +182,7 @@ impl Shared {
         }
     }
 
-    /// Writes no more to viewers.
+    /// Stops writing to viewers.
     pub fn leave_viewers(&self) {
         let mut state = self.state();
         if let Some(writer) = state.viewer.take() {
@@ -218,7 +218,7 @@ impl Shared {
 }
 
 impl State {
-    /// Everything that lasts, for somebody who has nothing yet.
+    /// Everything that lasts, for a new viewer.
     fn replay(&self, queue: &Queue) {
         queue.push(Item::Begin(self.recording.clone()));
         for item in self.lasting.iter() {

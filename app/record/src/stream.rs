@@ -1,4 +1,4 @@
-//! Streams of a recording: where entries go, and how far that is trusted.
+//! Streams of a recording: where entries go, and how reliable that is.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -17,13 +17,13 @@ use handeye_workbench::model::Step;
 use handeye_workbench::recording::Entry;
 use handeye_workbench::scene::Extent;
 
-/// Rows of a file are gathered for so long: many small chunks make a large file, and its index a large memory.
+/// Rows of a file are batched for this long: many small chunks make a large file, and its index uses much memory.
 const FILE_TICK: Duration = Duration::from_secs(2);
 
-/// Rows for a viewer are gathered for so long; shorter than anybody sees.
+/// Rows for a viewer are batched for this long; not perceptible.
 const VIEWER_TICK: Duration = Duration::from_millis(30);
 
-/// What may be on its way to a sink inside the stream \[bytes\].
+/// Limit of the data in flight to a sink inside the stream \[bytes\].
 const MAX_BYTES_IN_FLIGHT: u64 = 16 * 1024 * 1024;
 
 /// A sink that several streams share.
@@ -52,14 +52,14 @@ impl LogSink for SharedSink {
 pub enum Target {
     /// Every recording into a new file in the folder of its session.
     Sessions,
-    /// This file, which is there and empty.
+    /// This file, which exists and is empty.
     File {
         /// Where it is.
         path: PathBuf,
-        /// Which writes it.
+        /// The sink that writes it.
         sink: SharedSink,
     },
-    /// Viewers: what lasts and what is live may go different ways.
+    /// Viewers: lasting and live entries may take different paths.
     Viewers { lasting: SharedSink, live: SharedSink },
 }
 
@@ -72,19 +72,19 @@ pub struct Stream {
     pub file: Option<PathBuf>,
     /// Whether nothing live is written now.
     pub lasting_only: bool,
-    /// The step that is to be shown, once there was one.
+    /// The step to show, once there was one.
     step: Option<Step>,
-    /// What viewers are told to show.
+    /// What viewers are set to show.
     shown: Option<Shown>,
-    /// The arrangements that it has.
+    /// The arrangements that were sent.
     arranged: BTreeSet<Arranged>,
 }
 
-/// What viewers are told to show.
+/// What viewers are set to show.
 #[derive(Debug, Clone, Copy)]
 struct Shown {
     arranged: Arranged,
-    /// What is in sight; `None` while it is not known where anything is.
+    /// The extent in view; `None` while it is not known where anything is.
     extent: Option<Extent>,
 }
 
@@ -102,8 +102,8 @@ pub enum OpenError {
     Stream(#[from] RecordingStreamError),
 }
 
-/// A sink into a file. It holds nothing back until it is closed: the footer with a list of all chunks would be collected in
-/// memory for as long as the session lasts, and is missing anyway after a program that was ended in the middle.
+/// A sink into a file. It buffers nothing until it is closed: the footer with a list of all chunks would be collected in
+/// memory for as long as the session lasts, and is missing anyway after a crash of the program.
 ///
 /// # Errors
 /// When it cannot be written.
@@ -112,14 +112,14 @@ pub fn file_sink(path: &Path) -> Result<SharedSink, FileSinkError> {
 }
 
 impl Stream {
-    /// Begins a recording.
+    /// Starts a recording.
     ///
     /// # Errors
     /// [`OpenError`].
     pub fn open(target: &Target, recording: &Recording) -> Result<Self, OpenError> {
         let (lasting, live, file) = match target {
             Target::Sessions => {
-                // This is where recordings go that have a session.
+                // Recordings with a session are stored here.
                 let folder =
                     recording.folder.as_deref().ok_or_else(|| std::io::Error::from(std::io::ErrorKind::NotFound))?;
                 let path = file::create_beside(folder)?;
@@ -181,20 +181,20 @@ impl Stream {
             return Ok(());
         }
         let written = self.writer.write(&self.live, entry);
-        // The first state of the robot says where the arm is; from then on it only moves.
+        // The first state of the robot shows where the arm is; from then on it only moves.
         if self.shown.is_some_and(|shown| shown.extent.is_none()) && matches!(entry, Entry::Robot { .. }) {
             self.show(false);
         }
         written
     }
 
-    /// Has viewers lay out their views for the step, with all of the cell in sight. What is in sight already is not moved: a
-    /// person may have turned it.
+    /// Makes viewers lay out their views for the step, with the whole cell in view. A view that already shows it is not
+    /// moved: the user may have turned it.
     fn show(&mut self, is_another_cell: bool) {
         let Some(step) = self.step else { return };
         let arranged = self.writer.arranged(step);
         if is_another_cell {
-            // Where its arm is, its first state says.
+            // The place of its arm is known from its first state.
             self.shown = self.shown.map(|shown| Shown { extent: None, ..shown });
         }
         let now = self.writer.extent();
@@ -220,17 +220,17 @@ impl Stream {
         }
     }
 
-    /// Has everything written that is on its way, and waits for it.
+    /// Writes everything that is in flight, and waits for it.
     ///
     /// # Errors
-    /// When it cannot be.
+    /// When it cannot be written.
     pub fn flush(&self) -> Result<(), SinkFlushError> {
         self.lasting.flush_blocking()?;
         self.live.flush_blocking()
     }
 }
 
-/// One of the streams of a recording; one of them says its name, and when it began.
+/// One of the streams of a recording; one of them sends its name, and when it began.
 fn stream(
     recording: &Recording,
     sink: SharedSink,

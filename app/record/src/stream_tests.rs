@@ -8,7 +8,7 @@ use super::*;
 use handeye_workbench::model::Model;
 use handeye_workbench::testing::sample;
 
-/// A stream for viewers, and what viewers are sent of it.
+/// A stream for viewers, and what viewers receive of it.
 struct Bench {
     stream: Stream,
     sent: Arc<Mutex<Vec<LogMsg>>>,
@@ -35,7 +35,7 @@ impl Bench {
         self.stream.write_live(entry).expect("written");
     }
 
-    /// What the eye was told to look at since this was last asked, each time.
+    /// Each point that the eye was set to look at since the last call.
     fn looked_at(&self) -> Vec<[f32; 3]> {
         self.stream.flush().expect("flushed");
         let sent = std::mem::take(&mut *self.sent.lock().expect("whole"));

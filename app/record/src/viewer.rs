@@ -1,4 +1,4 @@
-//! Opening viewers, each on a thread of its own: programs are started and looked after, which takes its time.
+//! Opening viewers, each on a thread of its own: programs are started and watched, which takes time.
 
 use std::process::Child;
 use std::sync::Arc;
@@ -18,18 +18,18 @@ use handeye_workbench::recording;
 use handeye_workbench::recording::BROWSER_PATH;
 use handeye_workbench::text::Text;
 
-/// A native viewer that ends this soon has not been able to show anything.
+/// A native viewer that exits this soon has not shown anything.
 const GRACE: Duration = Duration::from_secs(3);
 
-/// A viewer that is connected to has answered by then.
+/// Time within which a connected viewer has to answer.
 const CONNECT: Duration = Duration::from_secs(10);
 
-/// Between two looks at a connection.
+/// Between two checks of a connection.
 const LOOK: Duration = Duration::from_millis(100);
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ViewerRequest {
-    /// The native one, or the web viewer where there is none.
+    /// The native one, or the web viewer if there is none.
     Best,
     /// The native one.
     Native,
@@ -77,7 +77,8 @@ impl Shared {
         self.reports.set_viewer(ViewerState::Failed(why));
     }
 
-    /// Has a server for viewers run, on the page of the web viewer if so wished: the addresses of the recording and of the page.
+    /// Runs a server for viewers, on the page of the web viewer if requested: returns the addresses of the recording and of the
+    /// page.
     fn serve(&self, on_page: bool) -> Result<[String; 2], Text> {
         let mut viewers = self.viewers();
         if viewers.server.is_none() {
@@ -127,7 +128,7 @@ impl Shared {
             self.reports.set_viewer(ViewerState::Web { url: server.page() });
             return;
         }
-        // Nobody looks: writing for viewers would only cost time.
+        // No viewer is left: writing for viewers would only cost time.
         self.leave_viewers();
         viewers.server = None;
         drop(viewers);

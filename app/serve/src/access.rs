@@ -1,8 +1,8 @@
-//! Who may in.
+//! Access control.
 //!
-//! At 127.0.0.1 whoever uses this machine may, by a name of this machine, as for the desktop window. At any other address
-//! only those who have the key, which the address that is printed at the start has in it: the browser gets it as a cookie
-//! and shows it to nobody else. Who guesses has to wait. In either case pages of other sites are refused.
+//! At 127.0.0.1 every user of this machine has access, under a host name of this machine, as for the desktop window. At
+//! any other address access needs the key, which is part of the address that is printed at the start: the browser gets it
+//! as a cookie and sends it to no other site. Guessing is rate limited. In either case pages of other sites are refused.
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
@@ -18,7 +18,8 @@ use handeye_http::names;
 /// Name of the cookie and of the key in the first address.
 const KEY: &str = "handeye_key";
 
-/// What browsers say of a request: how the site of the page is related to the one that is asked, how it asks, and what for.
+/// What browsers send about a request: how the site of the page is related to the requested one, the mode, and the
+/// destination.
 const SITE: &str = "sec-fetch-site";
 const MODE: &str = "sec-fetch-mode";
 const DEST: &str = "sec-fetch-dest";
@@ -32,32 +33,32 @@ pub const GUESSED: &str = "Too many wrong keys came from this address: wait for 
 /// A page of another site.
 pub const FOREIGN: &str = "This is asked for by a page of another site.\n";
 
-/// Who may in.
+/// Who has access.
 #[derive(Debug)]
 pub enum Access {
-    /// Whoever uses this machine.
+    /// Every user of this machine.
     Here,
-    /// Whoever has the key.
+    /// Everyone with the key.
     Key {
         key: String,
-        /// What others took for it.
+        /// Wrong keys so far.
         guesses: Mutex<Guesses>,
     },
 }
 
-/// What becomes of a request.
+/// The outcome of a request.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// It is answered.
     Enter,
     /// The key is in its address: it becomes this cookie.
     Welcome(String),
-    /// It is not answered.
+    /// It is refused.
     Refuse(StatusCode, &'static str),
 }
 
 impl Access {
-    /// As an address needs it.
+    /// The access for an address.
     ///
     /// # Errors
     /// When the system has no random numbers for a key.
@@ -70,7 +71,7 @@ impl Access {
         Ok(Self::Key { key: format!("{:032x}", u128::from_be_bytes(key)), guesses: Mutex::default() })
     }
 
-    /// What a person opens.
+    /// The address that the user opens.
     pub fn url(&self, address: SocketAddr) -> String {
         let address = named(address);
         match self {
@@ -79,7 +80,7 @@ impl Access {
         }
     }
 
-    /// What becomes of a request that comes from an address now.
+    /// The outcome of a request that comes from an address now.
     pub fn judge<B>(&self, request: &Request<B>, from: IpAddr, now: Instant) -> Verdict {
         if !is_of_this_site(request) {
             return Verdict::Refuse(StatusCode::FORBIDDEN, FOREIGN);
@@ -94,7 +95,7 @@ impl Access {
                     if shown.len() == key.len() {
                         guesses.look(shown, from, now, |shown| is_same(shown, key))
                     } else {
-                        // Nobody learns anything, and nothing is kept of it.
+                        // Nothing is revealed, and nothing is stored about it.
                         Look::Wrong
                     }
                 };
@@ -120,19 +121,18 @@ fn in_cookies<B>(request: &Request<B>) -> Option<&str> {
     shown.find(|(name, _)| *name == KEY).map(|(_, value)| value)
 }
 
-/// The key in the address that was printed.
+/// The key in the printed address.
 fn in_address<B>(request: &Request<B>) -> Option<&str> {
     let query = request.uri().query().filter(|_| request.uri().path() == "/")?;
     query.split('&').filter_map(|pair| pair.split_once('=')).find(|(name, _)| *name == KEY).map(|(_, value)| value)
 }
 
-/// An address that others can use: one that stands for all of this machine is replaced by the one that it has in the
-/// network.
+/// An address that others can use: an unspecified one is replaced by the machine's address in the network.
 fn named(address: SocketAddr) -> SocketAddr {
     if !address.ip().is_unspecified() {
         return address;
     }
-    // To connect sends nothing here: it only chooses the way to an address, which nobody has.
+    // Connecting sends nothing here: it only selects the route to an address, which nobody uses.
     let own = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).and_then(|socket| {
         socket.connect((Ipv4Addr::new(192, 0, 2, 1), 9))?;
         socket.local_addr()
@@ -140,9 +140,9 @@ fn named(address: SocketAddr) -> SocketAddr {
     SocketAddr::new(own.map_or(IpAddr::V4(Ipv4Addr::LOCALHOST), |own| own.ip()), address.port())
 }
 
-/// Whether a request comes from a page of the very server that it goes to, or from no page. A browser says where the page
-/// is from with everything but plain reading; for that as well it says, of this machine, how the two sites are related.
-/// A link on another page may lead to ours: what opens is seen by a person, and cannot be read by the other.
+/// Whether a request comes from a page of the same server that it goes to, or from no page. A browser sends the origin of
+/// the page with everything but plain reading; for that as well it sends, on this machine, how the two sites are related.
+/// A link on another page may lead to ours: what opens is seen by the user, and cannot be read by the other page.
 fn is_of_this_site<B>(request: &Request<B>) -> bool {
     let headers = request.headers();
     let is_only = |name: &str, values: &[&str]| {
@@ -163,7 +163,7 @@ fn is_of_this_site<B>(request: &Request<B>) -> bool {
     })
 }
 
-/// Whether two texts are the same, in a time that does not tell how much of them is.
+/// Whether two texts are equal, in a time that does not reveal how much of them is.
 fn is_same(one: &str, other: &str) -> bool {
     one.len() == other.len() && one.bytes().zip(other.bytes()).fold(0, |unlike, (a, b)| unlike | (a ^ b)) == 0
 }
@@ -252,7 +252,7 @@ mod tests {
             let request = Request::builder().uri(format!("/?handeye_key={key}")).header("host", "cell.example:8600");
             access.judge(&request.body(()).expect("a request"), from.parse().expect("an address"), began)
         };
-        // A page that was left open asks again and again with the key of yesterday.
+        // A page that was left open keeps sending yesterday's key.
         for _ in 0..1000 {
             assert_eq!(judged("10.0.0.7", &"a".repeat(32)), Verdict::Refuse(StatusCode::UNAUTHORIZED, REFUSED));
         }

@@ -1,4 +1,4 @@
-//! A folder as one archive, for a page to download: written bit by bit, without a file of its own.
+//! A folder as one archive, for a page to download: written piece by piece, without a file of its own.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ const MOST: u64 = 4 << 30;
 /// Bytes at a time.
 const PIECE: usize = 256 * 1024;
 
-/// Pieces that wait for whoever takes them.
+/// Pieces that wait for the receiver.
 const WAITING: usize = 4;
 
 /// What goes into an archive.
@@ -32,7 +32,7 @@ struct Listed {
 }
 
 impl Contents {
-    /// All files of a folder. A link may lead anywhere, and is left out.
+    /// All files of a folder. Links are left out, because they may lead anywhere.
     ///
     /// # Errors
     /// When something cannot be read, or is too large.
@@ -47,7 +47,7 @@ impl Contents {
         Ok(Self { files })
     }
 
-    /// Writes the archive to whoever takes the pieces, and ends when nobody does.
+    /// Writes the archive to the receiver of the pieces, and ends when that is gone.
     ///
     /// # Errors
     /// When something cannot be read or written.
@@ -59,7 +59,7 @@ impl Contents {
             let method = if is_packed { CompressionMethod::Stored } else { CompressionMethod::Deflated };
             let options = SimpleFileOptions::default().compression_method(method).large_file(true);
             archive.start_file(name.to_string_lossy(), options).map_err(io::Error::other)?;
-            // One that still grows has in it what it had when it was listed.
+            // A file that still grows is included with the size it had when it was listed.
             io::copy(&mut io::Read::take(file, *bytes), &mut archive)?;
         }
         archive.finish().map_err(io::Error::other)?.flush()
@@ -81,29 +81,29 @@ fn list(folder: &Path, name: &Path, files: &mut Vec<Listed>) -> io::Result<()> {
     Ok(())
 }
 
-/// Where an archive is written: piece by piece to somebody who takes them.
+/// The writing end of an archive: sends it piece by piece to a receiver.
 pub struct Pieces {
     to: mpsc::Sender<io::Result<Bytes>>,
     is_gone: bool,
 }
 
 impl Pieces {
-    /// What is written here comes out of the second.
+    /// What is written here arrives at the second.
     pub fn new() -> (Self, mpsc::Receiver<io::Result<Bytes>>) {
         let (to, from) = mpsc::channel(WAITING);
         (Self { to, is_gone: false }, from)
     }
 
-    /// Says that the rest does not come.
+    /// Reports that the rest does not come.
     pub fn fail(&self, error: io::Error) {
-        // Whoever took them may have gone.
+        // The receiver may be gone.
         let _told = self.to.blocking_send(Err(error)).is_ok();
     }
 }
 
 impl Write for Pieces {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        // Said once: an archive that is given up still writes its end.
+        // Reported once: an archive that is abandoned still writes its end.
         if !self.is_gone && self.to.blocking_send(Ok(Bytes::copy_from_slice(bytes))).is_err() {
             self.is_gone = true;
             return Err(io::ErrorKind::BrokenPipe.into());

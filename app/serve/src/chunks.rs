@@ -1,7 +1,7 @@
 //! What a frame is made of: one chunk of triangles for each shape, as bytes that a page keeps.
 //!
 //! egui joins all triangles of a texture and a clip rectangle into one mesh, so that one changed digit would change a
-//! mesh of thousands. A shape alone changes seldom.
+//! mesh of thousands. A single shape rarely changes.
 
 use std::hash::{DefaultHasher, Hasher as _};
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use egui::epaint::{ClippedPrimitive, ClippedShape, Mesh, Primitive};
 /// The triangles of one shape.
 #[derive(Debug, Clone)]
 pub struct Chunk {
-    /// Of the bytes; two chunks with one hash are one chunk.
+    /// Hash of the bytes; two chunks with the same hash are the same chunk.
     pub hash: u64,
     /// Little endian: clip rectangle \[points\] as `f32` left, top, right, bottom; `u32` number of the texture; `u32` count of
     /// vertices n; `u32` count of indices m; n vertices of 20 bytes: `f32` x, y \[points\], `f32` u, v in the texture, `u8` red,
@@ -28,7 +28,7 @@ pub fn of(ctx: &egui::Context, shapes: Vec<ClippedShape>, pixels_per_point: f32)
         for ClippedPrimitive { clip_rect, primitive } in ctx.tessellate(vec![shape], pixels_per_point) {
             match primitive {
                 Primitive::Mesh(mesh) if !mesh.indices.is_empty() => chunks.push(chunk(clip_rect, &mesh)),
-                // Nothing here draws by itself on a graphics card: it could not be seen in a browser.
+                // Nothing here draws on a graphics card by itself: it would not be visible in a browser.
                 Primitive::Mesh(_) | Primitive::Callback(_) => {}
             }
         }
@@ -58,7 +58,7 @@ fn chunk(clip: egui::Rect, mesh: &Mesh) -> Chunk {
     bytes.extend(number(mesh.texture_id).to_le_bytes());
     bytes.extend(count(mesh.vertices.len()));
     bytes.extend(count(mesh.indices.len()));
-    // As they stand in memory: every machine that this is built for is little endian.
+    // As in memory: every supported machine is little endian.
     bytes.extend_from_slice(bytemuck::cast_slice(&mesh.vertices));
     if small {
         let indices: Vec<u16> = mesh.indices.iter().map(|index| *index as u16).collect();
@@ -66,7 +66,7 @@ fn chunk(clip: egui::Rect, mesh: &Mesh) -> Chunk {
     } else {
         bytes.extend_from_slice(bytemuck::cast_slice(&mesh.indices));
     }
-    // What follows begins at a multiple of four again.
+    // What follows starts at a multiple of four again.
     bytes.resize(bytes.len().next_multiple_of(4), 0);
     let mut hasher = DefaultHasher::new();
     hasher.write(&bytes);
@@ -97,7 +97,7 @@ mod tests {
 
     #[test]
     fn what_did_not_change_has_the_same_chunk_and_what_did_another() {
-        // One context: another would put other letters into the same place of its texture.
+        // One context: another one would place other letters at the same position of its texture.
         let ctx = egui::Context::default();
         let (one, other) = (frame(&ctx, "12.3 mm"), frame(&ctx, "12.4 mm"));
         assert_eq!(one.len(), other.len());

@@ -9,7 +9,7 @@ use super::chunks::Chunk;
 use super::frame::{Frame, Typing};
 use super::textures::deflated;
 
-/// The highest bit of an entry: chunks of the frame before, from a place on.
+/// The highest bit of an entry: chunks of the previous frame, from an index on.
 const COPY: u32 = 1 << 31;
 
 /// What a page has.
@@ -35,7 +35,7 @@ struct Head<'a> {
     free: Vec<u32>,
 }
 
-/// A texture, or a part of one, behind the head.
+/// A texture, or a part of one, after the head.
 #[derive(Serialize)]
 struct TextureHead {
     id: u32,
@@ -47,7 +47,7 @@ struct TextureHead {
 }
 
 impl Shown {
-    /// The message; what is shown is the frame afterwards.
+    /// The message; afterwards what is shown is this frame.
     pub fn message(&mut self, number: u64, frame: &Frame) -> Vec<u8> {
         let chunks = deflated(&self.list(&frame.chunks));
         self.chunks = frame.chunks.iter().map(|chunk| chunk.hash).collect();
@@ -73,7 +73,7 @@ impl Shown {
             textures: textures.collect(),
             free,
         };
-        // Numbers and words only: it can be written.
+        // Only numbers and strings: serialization cannot fail.
         let head = serde_json::to_vec(&head).unwrap_or_default();
         let all: usize = news.iter().map(|(_, part)| part.encoded().bytes.len()).sum();
         let mut message = Vec::with_capacity(4 + head.len() + chunks.len() + all);
@@ -86,7 +86,7 @@ impl Shown {
         message
     }
 
-    /// The chunks: runs of the frame before, and those that were not in it.
+    /// The chunks: runs of the previous frame, and those that were not in it.
     fn list(&self, chunks: &[Chunk]) -> Vec<u8> {
         let mut places: HashMap<u64, usize> = HashMap::with_capacity(self.chunks.len());
         for (place, hash) in self.chunks.iter().enumerate() {
@@ -128,7 +128,7 @@ mod tests {
         Frame { chunks: names.iter().map(|name| chunk(*name)).collect(), ..Frame::default() }
     }
 
-    /// What a page makes of a message.
+    /// The result of a message on a page.
     fn applied(before: &[Vec<u8>], message: &[u8]) -> Vec<Vec<u8>> {
         let word = |bytes: &[u8]| u32::from_le_bytes(bytes[..4].try_into().expect("four bytes"));
         let end = 4 + word(message) as usize;

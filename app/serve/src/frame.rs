@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::chunks::Chunk;
 use super::textures::Textures;
 
-/// A frame, with all that is needed to draw it.
+/// A frame, with everything needed to draw it.
 #[derive(Clone, Default)]
 pub struct Frame {
     /// Width and height \[points\].
@@ -13,9 +13,9 @@ pub struct Frame {
     pub pixels_per_point: f32,
     /// Triangles, in the order in which they are drawn.
     pub chunks: Vec<Chunk>,
-    /// What they show.
+    /// The textures.
     pub textures: Textures,
-    /// The shape of the pointer, as style sheets call it.
+    /// The shape of the pointer, as named in style sheets.
     pub cursor: &'static str,
     /// Where text is being typed.
     pub typing: Option<Typing>,

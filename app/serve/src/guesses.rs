@@ -1,19 +1,19 @@
 //! Wrong keys, by the address that they come from.
 //!
-//! A page that was left open shows the same old key again and again: that is no guess. Who shows many different ones has
-//! to wait, and what he shows while he waits is not looked at, right or not.
+//! A page that was left open shows the same old key again and again: that is no guess. A client that sends many
+//! different ones has to wait, and what it sends meanwhile is not checked, right or not.
 
 use std::collections::HashMap;
 use std::net::{IpAddr, Ipv6Addr};
 use std::time::{Duration, Instant};
 
-/// Different wrong keys before one has to wait.
+/// Different wrong keys before a client has to wait.
 const FREE: usize = 10;
 
 /// How long, after each further one.
 const WAIT: Duration = Duration::from_mins(1);
 
-/// Addresses that are remembered; the one that was wrong longest ago makes room for another.
+/// Addresses that are remembered; the one with the oldest wrong key is dropped first.
 const MOST: usize = 1024;
 
 /// Wrong keys so far.
@@ -27,19 +27,19 @@ struct Wrong {
     last: Instant,
 }
 
-/// What became of a key that was shown.
+/// The outcome of a check of a key.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Look {
     /// It is the right one.
     Right,
     /// It is not.
     Wrong,
-    /// It was not looked at.
+    /// It was not checked.
     Late,
 }
 
 impl Guesses {
-    /// Looks at a text as long as the key, unless too many were wrong.
+    /// Checks a text as long as the key, unless too many were wrong.
     pub fn look(&mut self, shown: &str, from: IpAddr, now: Instant, is_right: impl FnOnce(&str) -> bool) -> Look {
         let from = network(from);
         let wrong = self.0.get(&from);
@@ -69,7 +69,7 @@ impl Guesses {
     }
 }
 
-/// Whoever has an address of the sixth version has all of its network.
+/// The owner of an IPv6 address has all of its network.
 fn network(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V6(address) => {

@@ -1,4 +1,4 @@
-//! The thread that owns the window: it takes in what was done, draws, and shows the frames to the pages.
+//! The thread that owns the window: it takes in the input, draws, and sends the frames to the pages.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -24,29 +24,28 @@ use handeye_workbench::session;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
-/// Between two frames: a screen shows no more.
+/// Minimum time between two frames: a screen shows no more.
 const PERIOD: Duration = Duration::from_millis(16);
 
-/// Screen readers are told no more often what there is: nobody hears faster.
+/// Interval of updates for screen readers: speech is not faster.
 const TELL: Duration = Duration::from_millis(400);
 
-/// Between two frames when something was done.
+/// Minimum time between two frames after input.
 const PERIOD_OF_INPUT: Duration = Duration::from_millis(8);
 
-/// What happened is taken in at least this often, also when nobody looks.
+/// Events are taken in at least this often, also when no page is open.
 const COLLECT: Duration = Duration::from_millis(250);
 
-/// What is pressed and released within it is a click \[s\]. On its way a release may be late by what a network needs to send
-/// it again.
+/// A press and release within this time is a click \[s\]. A release may be delayed by a retransmission in the network.
 const CLICK_S: f64 = 2.5;
 
-/// Between two looks at what is to be remembered.
+/// Between two checks of what has to be remembered.
 const REMEMBER: Duration = Duration::from_secs(10);
 
-/// Widest texture that every browser has.
+/// Widest texture that every browser supports.
 const TEXTURE_SIDE: usize = 4096;
 
-/// A window that pages show.
+/// A window that is shown in pages.
 pub struct Host {
     ctx: egui::Context,
     window: Window,
@@ -60,18 +59,18 @@ pub struct Host {
     drawn: Option<Instant>,
     collected: Instant,
     remembered: Instant,
-    /// When screen readers were told what there is.
+    /// When screen readers were last updated.
     reported: Instant,
     screen: Option<Screen>,
     held: Held,
-    /// Something is held at a page that was not heard for too long.
+    /// Something is held at a page that was silent for too long.
     is_silent: bool,
-    /// It was not heard for too long since a frame was drawn.
+    /// It was silent for too long since a frame was drawn.
     was_silent: bool,
     grip: Arc<Grip>,
-    /// How often what is held was let go, with what was taken in.
+    /// How often what is held was released, as of the input taken in.
     times: Times,
-    /// How often STOP was pressed, with what was taken in.
+    /// How often STOP was pressed, as of the input taken in.
     stops: u64,
     must_draw: bool,
     events: Vec<Event>,
@@ -136,7 +135,7 @@ impl Host {
         })
     }
 
-    /// Draws until the program is asked to end.
+    /// Draws until the program is requested to end.
     pub fn run(mut self) {
         loop {
             let wait = self.wait();
@@ -179,7 +178,7 @@ impl Host {
         self.drawn.map_or(self.began, |drawn| drawn + period)
     }
 
-    /// Before a page has said how large it is, there is nothing to draw for.
+    /// Before a page has reported its size, there is nothing to draw for.
     fn wants_frame(&self) -> bool {
         self.screen.is_some() && (!self.events.is_empty() || self.hub.is_watched())
     }
@@ -202,7 +201,7 @@ impl Host {
             self.stops = news.stops;
             self.window.app_mut().note_stops(news.stops);
         }
-        // A silence that is over by now has let go all the same, and a frame has to show so.
+        // A silence that is over by now has released it all the same, and a frame has to show that.
         self.was_silent |= self.held.is_any() && news.times.silent > self.times.silent;
         self.times = news.times;
         let is_silent = self.held.is_any() && (self.was_silent || self.grip.is_silent(Instant::now()));
@@ -315,8 +314,8 @@ impl Host {
         if ends { std::ops::ControlFlow::Break(()) } else { std::ops::ControlFlow::Continue(()) }
     }
 
-    /// Size of the window \[points\], and pixels of a point. On a page that is smaller than the panes have room for,
-    /// everything is smaller.
+    /// Size of the window \[points\], and pixels per point. On a page that is too small for the panes, everything is
+    /// drawn smaller.
     fn size(&self) -> (Vec2, f32) {
         let usual = Screen { width: SIZE[0], height: SIZE[1], scale: 1.0, touch: false };
         let Screen { width, height, scale, .. } = self.screen.unwrap_or(usual);
@@ -331,7 +330,7 @@ impl Host {
             max_texture_side: Some(TEXTURE_SIDE),
             time: Some(self.began.elapsed().as_secs_f64()),
             events: up_to_a_press(&mut self.events),
-            // As a window that has lost the focus: what is held moves nothing, and a click that comes late is still one.
+            // As for a window that has lost the focus: what is held moves nothing, and a late click still counts.
             focused: !self.is_silent,
             ..RawInput::default()
         };
@@ -344,7 +343,7 @@ impl Host {
     }
 }
 
-/// Notes that a frame is wanted after a while; whether that is sooner than one was wanted before.
+/// Requests a frame after a delay; returns whether that is sooner than one was wanted before.
 fn sooner(due: &Mutex<Option<Instant>>, delay: Duration) -> bool {
     let mut due = due.lock().unwrap_or_else(PoisonError::into_inner);
     let Some(wanted) = Instant::now().checked_add(delay) else { return false };
@@ -355,8 +354,8 @@ fn sooner(due: &Mutex<Option<Instant>>, delay: Duration) -> bool {
     is_sooner
 }
 
-/// Takes the events up to the first press. What was pressed has to be drawn once before it is released: a finger that is
-/// gone at the end of a frame has touched nothing in it.
+/// Takes the events up to the first press. What was pressed has to be drawn once before it is released: a touch that has
+/// ended by the end of a frame has no effect in it.
 fn up_to_a_press(events: &mut Vec<Event>) -> Vec<Event> {
     let press = events.iter().position(|event| matches!(event, Event::PointerButton { pressed: true, .. }));
     let rest = press.map_or(events.len(), |press| press + 1);

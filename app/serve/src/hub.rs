@@ -1,4 +1,4 @@
-//! Between the pages and the window: who is there, who drives, what was done, and what there is to see.
+//! Between the pages and the window: which pages there are, which one drives, the input, and what to show.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -20,7 +20,7 @@ use handeye_workbench::worker::StopLine;
 /// Pages at a time.
 pub const MOST_PAGES: usize = 32;
 
-/// What was done and not taken in yet; a page that says more than the window takes in is not in order.
+/// Limit of pending input; a page that sends more than the window takes in is faulty.
 const MOST_EVENTS: usize = 10_000;
 
 /// Number of a page.
@@ -29,7 +29,7 @@ pub type PageId = u64;
 /// Number of the first page.
 const FIRST: PageId = 1;
 
-/// Between the pages and the window.
+/// The connection between the pages and the window.
 pub struct Hub {
     state: Mutex<State>,
     bell: Bell,
@@ -40,7 +40,7 @@ pub struct Hub {
     controls: watch::Sender<Arc<[Control]>>,
 }
 
-/// Who is there.
+/// The users.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct People {
     pub driver: Option<PageId>,
@@ -48,56 +48,56 @@ pub struct People {
     pub pages: usize,
 }
 
-/// What pages say by themselves, in the language of the window.
+/// Texts of the pages themselves, in the language of the window.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct Words {
     /// The language, as pages name it.
     pub language: &'static str,
     /// Another page drives.
     pub watching: String,
-    /// Nobody drives.
+    /// No page drives.
     pub nobody: String,
     /// The button to drive.
     pub drive: String,
     /// The button that stops the arm.
     pub stop: String,
-    /// The connection is gone; `{time}` is when the server was last heard.
+    /// The connection is gone; `{time}` is when the server last answered.
     pub lost: String,
-    /// Files are on their way.
+    /// Files are being uploaded.
     pub uploading: String,
-    /// Files did not arrive.
+    /// The upload failed.
     pub not_uploaded: String,
-    /// The button for those who have a screen reader.
+    /// The button for users of a screen reader.
     pub reads: String,
 }
 
-/// What the window is to do for the page that drives, outside of what is drawn.
+/// What the window requests of the driving page, apart from drawing.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(tag = "t", rename_all = "snake_case")]
 pub enum PageRequest {
     /// Text goes to the clipboard.
     Copy { text: String },
-    /// An address is opened beside the page.
+    /// An address is opened next to the page.
     Visit {
         /// The address.
         url: String,
     },
 }
 
-/// What happened since the window last looked.
+/// What happened since the window last asked.
 #[derive(Debug, Default)]
 pub struct News {
-    /// The page that drives has another size.
+    /// The size of the driving page has changed.
     pub screen: Option<Screen>,
-    /// What was done there.
+    /// The input there.
     pub done: Vec<Done>,
-    /// Another page drives, or none: what was held is held no more.
+    /// Another page drives, or none: what was held is released.
     pub changed_hands: bool,
-    /// Uploads that are to be opened.
+    /// Uploads to open.
     pub opened: Vec<PathBuf>,
-    /// How often STOP was pressed so far. What was done before the last time is not here any more.
+    /// How often STOP was pressed so far. Input from before the last press is no longer included.
     pub stops: u64,
-    /// How often what is held was let go so far, with what is here.
+    /// How often what is held was released so far, including this input.
     pub times: Times,
 }
 
@@ -108,28 +108,28 @@ struct State {
     /// The name of the page that drove last, and is gone.
     drove: Option<String>,
     news: News,
-    /// Where STOP is on the page that drives.
+    /// Where STOP is on the driving page.
     stop_places: StopPlaces,
 }
 
 struct Page {
     /// The name that it keeps when it is loaded again or its connection was lost.
     name: String,
-    /// What its person sees.
+    /// The screen of its user.
     screen: Option<Screen>,
     visible: bool,
     /// A screen reader reads it.
     reads: bool,
-    /// Whether it has the latest frame and takes another.
+    /// Whether it has the latest frame and can take another.
     ready: bool,
     requests: tokio::sync::mpsc::Sender<PageRequest>,
 }
 
-/// Errands that wait for a page.
+/// Limit of requests that wait for a page.
 const MOST_PAGE_REQUESTS: usize = 16;
 
 impl Hub {
-    /// Nobody is there; what wakes the window comes out of the second.
+    /// No pages; wake-ups of the window arrive at the second.
     pub fn new(stop: Arc<StopLine>) -> (Self, Receiver<()>) {
         let (bell, rung) = Bell::new();
         let (pages, news, stop_places) = (BTreeMap::new(), News::default(), StopPlaces::default());
@@ -150,7 +150,7 @@ impl Hub {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Has the window look.
+    /// Wakes the window.
     pub fn wake(&self) {
         self.bell.ring();
     }
@@ -160,11 +160,11 @@ impl Hub {
         self.people.send_if_modified(|before| std::mem::replace(before, people) != people);
     }
 
-    /// A page has come. It drives when it is the first one, that of whoever has started this, or when it did before its
-    /// connection was lost and nobody has since. Others drive when their person asks for it.
+    /// A page has connected. It drives if it is the first one, that of the user who has started the program, or if it
+    /// did before its connection was lost and no other has since. Others drive when their user requests it.
     pub fn join(&self, name: &str) -> Option<(PageId, tokio::sync::mpsc::Receiver<PageRequest>)> {
         let mut state = self.state();
-        // The same page once more: its old connection is of no more use.
+        // The same page once more: its old connection is no longer needed.
         let before = state.pages.iter().find(|(_, page)| page.name == name).map(|(id, _)| *id);
         if before.is_none() && state.pages.len() >= MOST_PAGES {
             return None;
@@ -197,7 +197,7 @@ impl Hub {
         Some((id, page_requests_here))
     }
 
-    /// A page has gone.
+    /// A page has disconnected.
     pub fn leave(&self, id: PageId) {
         let mut state = self.state();
         let name = state.pages.remove(&id).map(|page| page.name);
@@ -211,12 +211,12 @@ impl Hub {
         self.wake();
     }
 
-    /// Whether a page is still one of them: another connection may have taken its place.
+    /// Whether a page is still connected: another connection may have replaced it.
     pub fn has(&self, id: PageId) -> bool {
         self.state().pages.contains_key(&id)
     }
 
-    /// A person wants to drive.
+    /// The user wants to drive.
     pub fn drive(&self, id: PageId) {
         let mut state = self.state();
         if state.pages.contains_key(&id) && state.driver != Some(id) {
@@ -227,19 +227,19 @@ impl Hub {
         self.wake();
     }
 
-    /// Stops the arm, whoever asks for it. The window learns of it when it has time.
+    /// Stops the arm, whichever page requests it. The window is notified when it has time.
     pub fn stop(&self) {
         let number = self.stop.press_outside();
         self.state().stopped(number, self.stop.grip());
         self.wake();
     }
 
-    /// Where STOP is on the page that drives.
+    /// Where STOP is on the driving page.
     pub fn stops_at(&self, places: StopPlaces) {
         self.state().stop_places = places;
     }
 
-    /// The page that drives was heard.
+    /// The driving page has reported.
     pub fn held(&self, id: PageId) {
         if self.state().driver == Some(id) {
             self.stop.grip().hear(Instant::now());
@@ -256,10 +256,10 @@ impl Hub {
         }
     }
 
-    /// What a person did. It counts only at the page that drives.
+    /// The user's input. It only counts on the driving page.
     ///
     /// # Errors
-    /// When more comes than is taken in.
+    /// When more arrives than is taken in.
     pub fn done(&self, id: PageId, done: Vec<Done>) -> Result<(), TooMuch> {
         let mut state = self.state();
         if state.driver == Some(id) {
@@ -296,7 +296,7 @@ impl Hub {
         }
     }
 
-    /// Whether a page can be seen, and whether it takes another frame.
+    /// Whether a page is visible, and whether it can take another frame.
     pub fn sees(&self, id: PageId, visible: Option<bool>, ready: Option<bool>) {
         let mut state = self.state();
         let Some(page) = state.pages.get_mut(&id) else { return };
@@ -316,7 +316,7 @@ impl Hub {
         let Some(page) = state.pages.get_mut(&id) else { return };
         page.reads = reads;
         drop(state);
-        // What there is, for the page that has just begun.
+        // The controls, for a page that has just started reading.
         self.controls.send_modify(|_controls| {});
         self.wake();
     }
@@ -331,7 +331,7 @@ impl Hub {
         self.state().pages.values().any(|page| page.reads)
     }
 
-    /// Tells screen readers what there is.
+    /// Updates the controls for screen readers.
     pub fn tell(&self, controls: Vec<Control>) {
         self.controls.send_if_modified(|before| {
             let is_new = **before != *controls;
@@ -342,12 +342,12 @@ impl Hub {
         });
     }
 
-    /// What there is, for screen readers.
+    /// The controls, for screen readers.
     pub fn controls(&self) -> watch::Receiver<Arc<[Control]>> {
         self.controls.subscribe()
     }
 
-    /// An upload is to be opened; only at the page that drives.
+    /// An upload to open; only from the driving page.
     pub fn open(&self, id: PageId, folder: PathBuf) {
         let mut state = self.state();
         if state.driver == Some(id) {
@@ -357,7 +357,7 @@ impl Hub {
         }
     }
 
-    /// Whether somebody waits for a frame.
+    /// Whether a page waits for a frame.
     pub fn is_watched(&self) -> bool {
         self.state().pages.values().any(|page| page.visible && page.ready)
     }
@@ -370,7 +370,7 @@ impl Hub {
         News { times: self.stop.grip().times(Instant::now()), ..news }
     }
 
-    /// Shows a frame to everybody.
+    /// Sends a frame to all pages.
     pub fn show(&self, frame: Arc<Frame>) {
         self.frames.send_modify(|(number, shown)| {
             *number += 1;
@@ -378,7 +378,7 @@ impl Hub {
         });
     }
 
-    /// Something for the page that drives.
+    /// A request for the driving page.
     pub fn send(&self, request: PageRequest) {
         let state = self.state();
         let driver = state.driver.and_then(|id| state.pages.get(&id));
@@ -387,7 +387,7 @@ impl Hub {
         }
     }
 
-    /// What pages say by themselves.
+    /// Sets the texts of the pages themselves.
     pub fn say(&self, words: Words) {
         self.words.send_if_modified(|before| {
             let is_new = *before != words;
@@ -401,12 +401,12 @@ impl Hub {
         self.frames.subscribe()
     }
 
-    /// Who is there.
+    /// The users.
     pub fn people(&self) -> watch::Receiver<People> {
         self.people.subscribe()
     }
 
-    /// What pages say by themselves.
+    /// The texts of the pages themselves.
     pub fn words(&self) -> watch::Receiver<Words> {
         self.words.subscribe()
     }
@@ -420,21 +420,21 @@ impl State {
         self.news.screen = self.pages.get(&id).and_then(|page| page.screen);
     }
 
-    /// Nothing is held any more, and what was done before does not count.
+    /// Nothing is held any more, and earlier input is dropped.
     fn let_go_all(&mut self, grip: &Grip) {
         grip.let_go();
         self.news.done.clear();
         self.news.changed_hands = true;
     }
 
-    /// STOP was pressed, so often by now: what was asked for before it is not begun after it.
+    /// STOP was pressed, this many times by now: what was requested before it does not begin after it.
     fn stopped(&mut self, number: u64, grip: &Grip) {
         self.let_go_all(grip);
         self.news.stops = self.news.stops.max(number);
     }
 }
 
-/// More comes from a page than the window takes in.
+/// A page sends more than the window takes in.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 #[error("more comes from a page than can be done")]
 pub struct TooMuch;
@@ -508,7 +508,7 @@ mod tests {
         assert!(!hub.has(first) && hub.has(second));
         hub.leave(first);
         assert_eq!(driver(&hub), Some(again));
-        // Nobody is made to drive when the driver leaves: moving an arm is something that one wants to do.
+        // No page starts to drive automatically when the driver leaves: the user has to choose to move an arm.
         hub.leave(again);
         assert_eq!(driver(&hub), None);
         assert!(hub.news().changed_hands);
@@ -523,7 +523,7 @@ mod tests {
         assert_eq!(driver(&hub), None);
         hub.done(other, vec![Done::Leave]).expect("ignored");
         assert!(hub.news().done.is_empty());
-        // The one whose connection was gone for a while, and since when nobody has driven.
+        // The page whose connection was gone for a while, with no other driver since.
         let again = join(&hub, "a");
         assert_eq!(driver(&hub), Some(again));
         hub.leave(again);

@@ -1,4 +1,4 @@
-//! What a page says, and the events that egui makes of it.
+//! The messages of a page, and the egui events made from them.
 
 use egui::{
     Event, ImeEvent, Key, Modifiers, MouseWheelUnit, PointerButton, Pos2, TouchDeviceId, TouchId, TouchPhase, Vec2,
@@ -9,16 +9,16 @@ use super::reading;
 use handeye_ui::actions::STOP_KEY;
 use handeye_ui::stop_button::StopPlaces;
 
-/// Sizes of a page that are drawn for \[points\].
+/// Supported sizes of a page \[points\].
 const SIZES: std::ops::RangeInclusive<f32> = 100.0..=8192.0;
 
-/// Pixels of a point that are drawn for.
+/// Supported pixels per point.
 const SCALES: std::ops::RangeInclusive<f32> = 0.5..=4.0;
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "t", rename_all = "snake_case", deny_unknown_fields)]
 pub enum PageMessage {
-    /// What a person did, in order.
+    /// The user's input, in order.
     Input { events: Vec<Done> },
     /// The size of the page.
     Screen(Screen),
@@ -36,11 +36,11 @@ pub enum PageMessage {
     },
     /// A button, key or finger is still down.
     Held,
-    /// The arm is to stop.
+    /// Stop the arm.
     Stop,
-    /// The person wants to drive.
+    /// The user wants to drive.
     Drive,
-    /// Files that were uploaded are to be opened.
+    /// Uploaded files to open.
     Open {
         /// Name of the upload.
         upload: String,
@@ -55,26 +55,25 @@ pub struct Screen {
     pub width: f32,
     /// Height \[points\].
     pub height: f32,
-    /// Pixels of a point.
+    /// Pixels per point.
     pub scale: f32,
-    /// Whether it is touched and not pointed at.
+    /// Whether it has touch input instead of a pointer.
     #[serde(default)]
     pub touch: bool,
 }
 
 impl Screen {
-    /// Whether it can be drawn for.
+    /// Whether it is supported.
     pub fn is_sensible(&self) -> bool {
         SIZES.contains(&self.width) && SIZES.contains(&self.height) && SCALES.contains(&self.scale)
     }
 }
 
-/// Something that a person did. Places are in points of the frame that the page shows, from the
-/// left top corner.
+/// Input of the user. Places are in points of the frame that the page shows, from the top left corner.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "e", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Done {
-    /// The pointer is elsewhere.
+    /// The pointer has moved.
     Move {
         /// Where.
         at: [f32; 2],
@@ -83,7 +82,7 @@ pub enum Done {
     Button {
         /// Where.
         at: [f32; 2],
-        /// 0 primary, 1 middle, 2 secondary, as browsers count them.
+        /// 0 primary, 1 middle, 2 secondary, as in browsers.
         button: u8,
         /// Pressed.
         down: bool,
@@ -96,25 +95,25 @@ pub enum Done {
     Wheel {
         /// How far the content moves.
         by: [f32; 2],
-        /// By lines, not by points.
+        /// In lines, not in points.
         lines: bool,
         /// See [`modifiers`].
         modifiers: u8,
     },
-    /// A finger.
+    /// A touch.
     Touch {
         /// Which one.
         id: u32,
         /// Where.
         at: [f32; 2],
-        /// What it did.
+        /// Its phase.
         phase: Phase,
         /// Whether it is the first one, which also acts as a pointer.
         first: bool,
     },
     /// A key was pressed or released.
     Key {
-        /// As browsers call it.
+        /// Its name in browsers.
         key: String,
         /// Pressed.
         down: bool,
@@ -132,9 +131,9 @@ pub enum Done {
     Composed { text: String },
     /// Text comes from the clipboard.
     Paste { text: String },
-    /// The selection is to be copied.
+    /// Copy the selection.
     Copy,
-    /// The selection is to be cut.
+    /// Cut the selection.
     Cut,
     /// A control was reached by a screen reader, or pressed.
     Control {
@@ -143,23 +142,23 @@ pub enum Done {
         /// It was pressed.
         press: bool,
     },
-    /// The page has the keyboard, or has not.
+    /// The page has gained or lost the keyboard focus.
     Focus {
         /// It has.
         focused: bool,
     },
 }
 
-/// What a finger did.
+/// Phase of a touch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Phase {
-    /// It came down.
+    /// It started.
     Start,
     Move,
-    /// It was lifted.
+    /// It ended.
     End,
-    /// The browser took it for something of its own.
+    /// The browser used it for a gesture of its own.
     Cancel,
 }
 
@@ -174,7 +173,7 @@ fn place([x, y]: [f32; 2]) -> Option<Pos2> {
 }
 
 impl Done {
-    /// Whether it presses STOP, wherever that is. It counts when it goes down: nobody has to let it go to stop the arm.
+    /// Whether it presses STOP, wherever that is. It counts when it goes down: a release is not needed to stop the arm.
     pub fn stops(&self, stop: &StopPlaces) -> bool {
         let is_there = |at: [f32; 2]| place(at).is_some_and(|at| stop.rects.iter().any(|rect| rect.contains(at)));
         match self {
@@ -189,7 +188,7 @@ impl Done {
         }
     }
 
-    /// Whether something that was held may be held no more.
+    /// Whether it may end what was held.
     pub fn lets_go(&self) -> bool {
         match self {
             Self::Button { down, .. } | Self::Key { down, .. } => !down,
@@ -199,7 +198,7 @@ impl Done {
         }
     }
 
-    /// Adds the events that it means. What makes no sense means nothing.
+    /// Adds the events that it stands for. Invalid input is ignored.
     pub fn add_to(self, events: &mut Vec<Event>) {
         match self {
             Self::Move { at } => events.extend(place(at).map(Event::PointerMoved)),
@@ -276,13 +275,13 @@ fn touch(id: u32, at: [f32; 2], phase: Phase, first: bool, events: &mut Vec<Even
 fn named(key: &str) -> Option<Key> {
     match key {
         " " => Some(Key::Space),
-        // Letters come as they are typed, with Shift or without.
+        // Letters arrive as typed, with or without Shift.
         key if key.len() == 1 => Key::from_name(&key.to_ascii_uppercase()),
         key => Key::from_name(key),
     }
 }
 
-/// What is held down, so that it can be released when nothing is heard of the page any more.
+/// What is held down, so that it can be released when the page is silent.
 #[derive(Debug, Default)]
 pub struct Held {
     buttons: Vec<PointerButton>,
@@ -296,7 +295,7 @@ impl Held {
         !(self.buttons.is_empty() && self.keys.is_empty() && self.touches.is_empty())
     }
 
-    /// Takes notice of events.
+    /// Takes note of events.
     pub fn heed(&mut self, events: &[Event]) {
         for event in events {
             match event {
@@ -310,7 +309,7 @@ impl Held {
         }
     }
 
-    /// Releases the keys, each of which would otherwise do again what it does when the page is heard again.
+    /// Releases the keys; otherwise each would repeat its action when the page reports again.
     pub fn release_keys(&mut self) -> Vec<Event> {
         let released = |key| {
             let modifiers = Modifiers::NONE;
@@ -319,7 +318,7 @@ impl Held {
         std::mem::take(&mut self.keys).into_iter().map(released).collect()
     }
 
-    /// Releases all of it where it does nothing but end: a button that is let go far away is not clicked.
+    /// Releases everything without further effect: a button that is released far away is not clicked.
     pub fn release(&mut self) -> Vec<Event> {
         const NOWHERE: Pos2 = Pos2::new(-1e4, -1e4);
         let mut events = self.release_keys();
@@ -341,7 +340,7 @@ impl Held {
     }
 }
 
-/// Whether something that was held may be held no more, as the window hears of it.
+/// Whether an event may end what was held, as the window receives it.
 pub fn lets_go(event: &Event) -> bool {
     match event {
         Event::PointerButton { pressed, .. } | Event::Key { pressed, .. } => !pressed,
@@ -523,7 +522,7 @@ mod tests {
         let far = |event: &Event| matches!(event, Event::PointerButton { pressed: false, pos, .. } if pos.x < -1e3);
         assert!(released.iter().any(far));
         assert!(released.iter().any(|event| matches!(event, Event::Key { key: Key::ArrowUp, pressed: false, .. })));
-        // Released by the person: nothing is left to release.
+        // Released by the user: nothing is left to release.
         held.heed(&down);
         held.heed(&released);
         assert_eq!(held.release(), []);

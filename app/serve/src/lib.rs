@@ -1,9 +1,9 @@
 //! The workbench in a browser: the window is drawn here, and pages show it (protocol: docs/reference/browser.md).
 //!
-//! One thread owns egui's context and the [`Window`](handeye_ui::Window), as that of a desktop does ([`host`]). What it
+//! One thread owns egui's context and the [`Window`](handeye_ui::Window), as for a desktop window ([`host`]). What it
 //! has drawn is a [`frame::Frame`]: triangles in chunks, and textures. Every page has a connection of its own
-//! ([`socket`]), which sends what changed since the frame that this page has ([`difference`]); a page that is slow gets
-//! fewer frames and holds nobody up. What a person does at a page comes back through the [`hub`], which knows who
+//! ([`socket`]), which sends what changed since the frame that this page has ([`difference`]); a slow page gets fewer
+//! frames and does not delay others. The user's input at a page comes back through the [`hub`], which knows which page
 //! drives.
 
 mod access;
@@ -40,23 +40,23 @@ use host::Host;
 use hub::Hub;
 use site::Site;
 
-/// Threads that talk to browsers.
+/// Threads for connections of browsers.
 const THREADS: usize = 2;
 
-/// What is held for browsers. A page has one connection that lasts and a few for files.
+/// Limits for browsers. A page has one connection that lasts and a few for files.
 const LIMITS: Limits = Limits {
     connections: 64,
     idle: std::time::Duration::from_secs(10),
     stalled: std::time::Duration::from_secs(30),
-    // A recording that is uploaded comes within it, or not at all.
+    // An upload of a recording has to arrive within this time.
     answer: std::time::Duration::from_mins(10),
 };
 
-/// Serves the workbench until it is asked to end, after `begin` with its application, and the recording beside it.
-/// `announce` is told the address to open, once it can be.
+/// Serves the workbench until it is requested to end, after `begin` with its application, and the recording next to it.
+/// `announce` receives the address, once it can be opened.
 ///
 /// # Errors
-/// When the port is taken or the address is none of this machine, and as for the window.
+/// When the port is taken or the address does not belong to this machine, and as for the window.
 pub fn run(args: ServeArgs, begin: Begin, recording: Router, announce: impl FnOnce(&str)) -> anyhow::Result<()> {
     let ServeArgs { bind, port, allow, gui } = args;
     let opening = Opening::read(gui, begin)?;

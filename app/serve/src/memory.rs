@@ -1,4 +1,4 @@
-//! What a window in browsers remembers from one start to the next: a file beside the settings.
+//! What a window in browsers remembers from one start to the next: a file next to the settings.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use handeye_workbench::settings::{self, SettingsWrite};
 /// Name of the file.
 const FILE: &str = "browser.json";
 
-/// The file, and what it says.
+/// The file, and its content.
 #[derive(Debug)]
 pub struct Memory {
     path: Option<PathBuf>,
@@ -26,7 +26,7 @@ struct Kept {
 }
 
 impl Memory {
-    /// Reads it. What cannot be read is forgotten: where panes are is no loss that anybody should be stopped for.
+    /// Reads it. What cannot be read is ignored: a lost layout must not prevent the start.
     pub fn open() -> Self {
         let path = settings::default_path().map(|path| path.with_file_name(FILE));
         let kept = path.as_ref().and_then(|path| std::fs::read(path).ok());
@@ -34,13 +34,13 @@ impl Memory {
         Self { path, kept }
     }
 
-    /// What the last window left.
+    /// The state of the last window.
     pub fn last(&self) -> (Remembered, Layout) {
         let layout = self.kept.layout.clone().map_or_else(Layout::default, Layout::brought_up_to_date);
         (self.kept.remembered.clone(), layout)
     }
 
-    /// What is to be written, if it is another than before.
+    /// What has to be written, if it has changed.
     pub fn keep(&mut self, (remembered, layout): (Remembered, Layout)) -> Option<SettingsWrite> {
         let now = Kept { remembered, layout: Some(layout) };
         if now == self.kept {

@@ -1,7 +1,7 @@
-//! What a screen reader is told of the window, and what is done by one.
+//! What a screen reader gets of the window, and its actions.
 //!
-//! The tree that egui makes for screen readers becomes a list of what has a name, in the order of the tree. A page that asks
-//! for it has it as elements of its own, which the reader of the browser knows how to read and to press.
+//! The tree that egui makes for screen readers becomes a list of everything with a name, in the order of the tree. A page
+//! that requests it has it as elements of its own, which the browser's screen reader can read and press.
 
 use std::collections::HashMap;
 
@@ -9,21 +9,21 @@ use egui::Event;
 use egui::accesskit::{Action, ActionRequest, Node, NodeId, Role, Toggled, TreeId, TreeUpdate};
 use serde::Serialize;
 
-/// Most of them that are told.
+/// Limit of controls that are sent.
 const MOST: usize = 2000;
 
 /// Something with a name.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Control {
-    /// Number in the tree; too large for the numbers of browsers.
+    /// Number in the tree; too large for JavaScript numbers.
     pub id: String,
-    /// As ARIA calls it; `None`: words.
+    /// Its ARIA role; `None`: text.
     pub role: Option<&'static str>,
-    /// What it is called, or says.
+    /// Its name, or its text.
     pub label: String,
     /// It can be pressed.
     pub enabled: bool,
-    /// It is switched on, or chosen; `None`: it is no switch.
+    /// It is switched on, or chosen; `None`: it is not a switch.
     pub pressed: Option<bool>,
 }
 
@@ -45,7 +45,7 @@ pub fn controls(update: &TreeUpdate) -> Vec<Control> {
 
 fn control(id: NodeId, node: &Node) -> Option<Control> {
     let role = match node.role() {
-        // The letters of what its parent says.
+        // The letters of its parent's text.
         Role::TextRun => return None,
         Role::Button => Some("button"),
         Role::CheckBox => Some("checkbox"),
@@ -70,7 +70,7 @@ fn control(id: NodeId, node: &Node) -> Option<Control> {
     Some(Control { id: id.0.to_string(), role, label, enabled: !node.is_disabled(), pressed })
 }
 
-/// The event by which a control is pressed, or gets the keyboard.
+/// The event that presses a control, or gives it the keyboard focus.
 pub fn event(id: &str, press: bool) -> Option<Event> {
     let action = if press { Action::Click } else { Action::Focus };
     let target_node = NodeId(id.parse().ok()?);

@@ -30,20 +30,20 @@ use super::upload::{UploadError, Uploads};
 use handeye_http::door::asked_from;
 use handeye_workbench::app::InBrowser;
 
-/// What the browser may load and where it may connect to: this server, and nothing else.
+/// What the browser may load and where it may connect to: this server only.
 const POLICY: &str = "default-src 'none'; script-src 'self'; worker-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; \
                       base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 /// A header that no form of another site can send.
 const OURS: &str = "x-handeye";
 
-/// Folders that are downloaded at a time: each keeps a thread and the disk busy.
+/// Simultaneous downloads of folders: each keeps a thread and the disk busy.
 const DOWNLOADS: usize = 1;
 
-/// What is read of a recording at a time. A viewer has one that lasts; of the connections most are left for pages.
+/// Simultaneous reads of a recording. A viewer has one that lasts; most of the connections are left for pages.
 const RECORDINGS: usize = 16;
 
-/// All that is served.
+/// Everything that is served.
 pub struct Site {
     access: Access,
     hub: Arc<Hub>,
@@ -61,12 +61,12 @@ impl Site {
         Self { access, hub, shown, uploads, downloads, recordings }
     }
 
-    /// What a person opens.
+    /// The address that the user opens.
     pub fn url(&self, address: std::net::SocketAddr) -> String {
         self.access.url(address)
     }
 
-    /// What can be asked for, the recording included, by those who may.
+    /// The routes, including the recording, for those who have access.
     pub fn routes(self: Arc<Self>, recording: Router) -> Router {
         let recording = recording.layer(middleware::from_fn_with_state(Arc::clone(&self), with_a_place));
         Router::new()
@@ -84,7 +84,7 @@ impl Site {
     }
 }
 
-/// Lets those in who may, and tells browsers what they may do with the answer.
+/// Checks access, and tells browsers what they may do with the response.
 async fn judged(State(site): State<Arc<Site>>, request: Request, next: Next) -> Response {
     let mut response = match site.access.judge(&request, asked_from(&request), Instant::now()) {
         Verdict::Enter => next.run(request).await,
@@ -93,7 +93,7 @@ async fn judged(State(site): State<Arc<Site>>, request: Request, next: Next) -> 
             (StatusCode::SEE_OTHER, [(SET_COOKIE, cookie.as_str()), (LOCATION, "/")]).into_response()
         }
     };
-    // The viewer of recordings brings its own.
+    // The viewer of recordings sets its own.
     let policy = response.headers_mut().entry(CONTENT_SECURITY_POLICY);
     policy.or_insert(HeaderValue::from_static(POLICY));
     response.headers_mut().extend([
@@ -104,7 +104,7 @@ async fn judged(State(site): State<Arc<Site>>, request: Request, next: Next) -> 
     response
 }
 
-/// Keeps a place for what is read of a recording until the last of it was made.
+/// Keeps a slot for a read of a recording until its end was produced.
 async fn with_a_place(State(site): State<Arc<Site>>, request: Request, next: Next) -> Response {
     let Ok(place) = Arc::clone(&site.recordings).try_acquire_owned() else {
         return (StatusCode::SERVICE_UNAVAILABLE, "The recording is read by too many already.\n").into_response();
@@ -117,7 +117,7 @@ async fn with_a_place(State(site): State<Arc<Site>>, request: Request, next: Nex
     })
 }
 
-/// Makes the connection of a page out of a request.
+/// Turns a request into the connection of a page.
 async fn connected(State(site): State<Arc<Site>>, mut request: Request) -> Response {
     let headers = request.headers();
     let says = |name, word: &str| {
@@ -125,7 +125,7 @@ async fn connected(State(site): State<Arc<Site>>, mut request: Request) -> Respo
         value.split(',').any(|part| part.trim().eq_ignore_ascii_case(word))
     };
     let is_websocket = says(UPGRADE, "websocket") && says(CONNECTION, "upgrade") && says(SEC_WEBSOCKET_VERSION, "13");
-    // Browsers say where a page is from; who says nothing is no page, and has no business here either.
+    // Browsers send where a page is from; a client that sends nothing is not a page, and is refused.
     let is_page = headers.contains_key(ORIGIN);
     let (true, true, Some(key)) = (is_websocket, is_page, headers.get(SEC_WEBSOCKET_KEY)) else {
         return (StatusCode::BAD_REQUEST, "This is for the connection of a page.\n").into_response();
@@ -193,7 +193,7 @@ async fn download(State(site): State<Arc<Site>>, request: Request) -> Response {
         }
     };
     let (mut pieces, taken) = Pieces::new();
-    // Not waited for: it ends with the last piece, or when nobody takes any more.
+    // Not waited for: it ends with the last piece, or when the receiver is gone.
     drop(tokio::task::spawn_blocking(move || {
         let _until_then = place;
         if let Err(error) = contents.write(&mut pieces) {
@@ -206,7 +206,7 @@ async fn download(State(site): State<Arc<Site>>, request: Request) -> Response {
     (headers, Body::from_stream(ReceiverStream::new(taken))).into_response()
 }
 
-/// The name of a folder's archive, with letters that every system takes.
+/// The name of a folder's archive, with letters that every system accepts.
 fn archive_name(folder: &Path) -> String {
     let parent = folder.parent().and_then(Path::file_name);
     let parts = parent.into_iter().chain(folder.file_name()).map(|part| part.to_string_lossy().into_owned());

@@ -1,7 +1,7 @@
-//! The connection of a page: frames and words one way, what a person does the other way.
+//! The connection of a page: frames and texts in one direction, the user's input in the other.
 //!
-//! Two tasks, so that a page that takes its frames slowly is heard all the same: a STOP waits for no frame, neither for one
-//! that is sent nor for one that is drawn.
+//! Two tasks, so that input of a page that takes its frames slowly is still received: a STOP does not wait for a frame to
+//! be sent or drawn.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -22,44 +22,44 @@ use super::input::PageMessage;
 use super::reading::Control;
 use super::upload::Uploads;
 
-/// Longest message of a page \[bytes\]: what is pasted is in it.
+/// Longest message of a page \[bytes\]: includes pasted text.
 const MOST_BYTES: usize = 64 << 10;
 
-/// Frames on their way to a page. With one, the page would wait for the next after every one.
+/// Frames in flight to a page. With one, the page would wait for the next after every one.
 const ON_THE_WAY: u64 = 2;
 
-/// How often a page is asked whether it is there.
+/// How often a page is pinged.
 const PING: Duration = Duration::from_secs(5);
 
-/// How often a page is told that the server is there: what it shows is not live when it hears nothing.
+/// How often the server reports to a page that it is alive: what the page shows is not live when it receives nothing.
 const ALIVE: Duration = Duration::from_secs(1);
 
-/// A page of which nothing was heard for so long is gone.
+/// A page that was silent for this long is gone.
 const GONE: Duration = Duration::from_secs(15);
 
-/// A page that takes nothing for so long is gone.
+/// A page that takes nothing for this long is gone.
 const STALLED: Duration = Duration::from_secs(30);
 
 type Socket = WebSocketStream<TokioIo<Upgraded>>;
 
-/// What a page is told besides frames.
+/// What a page receives in addition to frames.
 #[derive(Serialize)]
 #[serde(tag = "t", rename_all = "snake_case")]
 enum ServerMessage<'a> {
-    /// Who drives.
+    /// Which page drives.
     People { you: bool, driven: bool, pages: usize },
-    /// What the page says by itself.
+    /// Texts of the page itself.
     Words {
         #[serde(flatten)]
         words: &'a Words,
     },
-    /// What there is, for a screen reader.
+    /// The controls, for a screen reader.
     Controls { controls: &'a [Control] },
-    /// The server is there, also when there is nothing new.
+    /// The server is alive, also when there is nothing new.
     Alive,
 }
 
-/// Talks to a page until it has gone.
+/// Serves a page until it has disconnected.
 pub async fn attend(upgraded: Upgraded, name: String, hub: Arc<Hub>, uploads: Arc<Uploads>) {
     let config = WebSocketConfig::default().max_message_size(Some(MOST_BYTES)).max_frame_size(Some(MOST_BYTES));
     let socket: Socket = WebSocketStream::from_raw_socket(TokioIo::new(upgraded), Role::Server, Some(config)).await;
@@ -194,7 +194,7 @@ async fn write(
                 }
                 last = number;
                 sent += 1;
-                // Elsewhere: the threads that listen to pages have no time for it.
+                // On another thread: the threads that listen to pages have no time for it.
                 let stated = tokio::task::spawn_blocking(move || {
                     let message = page.message(sent, &frame);
                     (page, message)
@@ -220,6 +220,6 @@ async fn write(
 }
 
 fn json(stated: &impl Serialize) -> Message {
-    // Words and numbers only: they can be written.
+    // Only strings and numbers: serialization cannot fail.
     Message::text(serde_json::to_string(stated).unwrap_or_default())
 }

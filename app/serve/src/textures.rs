@@ -1,7 +1,7 @@
-//! The textures that pages need, with what each page has not got yet.
+//! The textures that pages need, with what each page lacks.
 //!
 //! A texture is replaced as a whole (a live image) or in parts (the letters of the fonts, as they are first needed). Each
-//! change has a version, so that a page is sent exactly what came after the one that it has.
+//! change has a version, so that a page gets exactly what came after its own.
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::Write as _;
@@ -15,13 +15,13 @@ use flate2::write::DeflateEncoder;
 use super::chunks;
 use handeye_workbench::jpeg::{self, ColorType};
 
-/// From this width and height on an image without transparency is sent as JPEG.
+/// From this width and height an image without transparency is sent as JPEG.
 const JPEG_FROM: usize = 128;
 
-/// Quality of images that are seen at about their size. At it, corners of a board are without visible blocks.
+/// Quality of images that are seen at about their size. With it, corners of a board have no visible blocks.
 const JPEG_QUALITY: u8 = 85;
 
-/// Parts that are kept one by one; beyond it, a texture is sent as a whole to who comes new.
+/// Parts that are kept one by one; beyond it, a new page gets the texture as a whole.
 const MOST_PARTS: usize = 64;
 
 /// A texture or a part of one, as it is sent. It is encoded once, for all pages.
@@ -30,7 +30,7 @@ pub struct Part {
     pub at: Option<[usize; 2]>,
     /// The pixels.
     pub image: Arc<ColorImage>,
-    /// How it is drawn.
+    /// How it is sampled.
     pub options: TextureOptions,
     encoded: OnceLock<Encoded>,
 }
@@ -48,14 +48,14 @@ impl Part {
         Arc::new(Self { at, image, options, encoded: OnceLock::new() })
     }
 
-    /// As it is sent.
+    /// Its encoded bytes.
     pub fn encoded(&self) -> &Encoded {
         self.encoded.get_or_init(|| self.encode())
     }
 
     fn encode(&self) -> Encoded {
         let [width, height] = self.image.size;
-        // Whoever looks at single pixels wants to see those.
+        // At high zoom the exact pixels have to be visible.
         let is_seen_closely = self.options.magnification == TextureFilter::Nearest;
         if self.at.is_none()
             && width.min(height) >= JPEG_FROM
@@ -69,12 +69,12 @@ impl Part {
     }
 }
 
-/// Without a way out of the loop, so that many pixels are looked at in one instruction.
+/// Without an early exit from the loop, so that many pixels are compared in one instruction.
 fn is_opaque(image: &ColorImage) -> bool {
     image.pixels.iter().fold(u8::MAX, |all, pixel| all & pixel.a()) == u8::MAX
 }
 
-/// Deflated without a header, as browsers call `deflate-raw`.
+/// Deflated without a header, `deflate-raw` in browsers.
 pub fn deflated(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = DeflateEncoder::new(Vec::with_capacity(bytes.len() / 4), Compression::fast());
     // Writing into memory does not fail.
@@ -116,7 +116,7 @@ impl Texture {
     }
 }
 
-/// All textures at an instant. To copy it copies no pixels.
+/// All textures at an instant. A copy does not copy pixels.
 #[derive(Clone, Default)]
 pub struct Textures {
     textures: BTreeMap<u32, Texture>,
@@ -151,18 +151,18 @@ impl Textures {
             self.textures.insert(id, Texture { whole: part, whole_version: version, parts: Vec::new() });
             return;
         }
-        // egui changes only textures that it has made.
+        // egui only changes textures that it has created.
         let Some(texture) = self.textures.get_mut(&id) else { return };
         texture.parts.push((version, part));
         if texture.parts.len() > MOST_PARTS {
             let (image, options) = (texture.joined(), texture.whole.options);
-            // Who has all of it but the last parts is sent the whole once more.
+            // A page that lacks only the last parts gets the whole once more.
             *texture = Texture { whole: Part::new(None, image, options), whole_version: version, parts: Vec::new() };
         }
     }
 
-    /// What a page needs that has these versions, in the order in which it has to be applied; and the textures that it
-    /// need not keep. The versions are then those of now.
+    /// What a page with these versions needs, in the order in which it has to be applied; and the textures that it need
+    /// not keep. The versions are then updated.
     pub fn news(&self, has: &mut HashMap<u32, u64>) -> (Vec<(u32, Arc<Part>)>, Vec<u32>) {
         let gone: Vec<u32> = has.keys().filter(|id| !self.textures.contains_key(id)).copied().collect();
         for id in &gone {

@@ -1,7 +1,7 @@
-//! Files that are dropped on a page: they come one by one into a new folder of the sessions, which is then opened.
+//! Files that are dropped on a page: they are stored one by one in a new folder of the sessions, which is then opened.
 //!
-//! What is remembered of uploads is bounded, and so are the files that come at a time, so that neither many uploads nor
-//! slow ones keep anybody out.
+//! The state of uploads is bounded, and so is the number of simultaneous files, so that neither many uploads nor slow
+//! ones block others.
 
 use std::collections::HashMap;
 use std::io;
@@ -24,10 +24,10 @@ const MOST_OF_ALL: u64 = 8 << 30;
 /// Files of an upload.
 const MOST_FILES: usize = 20_000;
 
-/// Uploads that are remembered; that which was heard of longest ago makes room for another.
+/// Uploads that are remembered; the least recently used is dropped first.
 const MOST_UPLOADS: usize = 64;
 
-/// Files that come at a time. A page sends one after the other; of the connections most are left for other things.
+/// Simultaneous files. A page sends one after the other; most of the connections are left for other things.
 const MOST_AT_A_TIME: usize = 8;
 
 /// Longest wait for the next piece of a file.
@@ -59,13 +59,13 @@ struct Begun {
     folder: PathBuf,
     bytes: u64,
     files: usize,
-    /// Files that are on their way.
+    /// Files in progress.
     coming: usize,
     /// Number of its latest file among all.
     latest: u64,
 }
 
-/// A file that is on its way.
+/// A file in progress.
 struct Coming<'a> {
     uploads: &'a Uploads,
     upload: &'a str,
@@ -83,16 +83,16 @@ impl Drop for Coming<'_> {
 /// Why a file was not taken.
 #[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 pub(crate) enum UploadError {
-    /// The path leads elsewhere or is none.
+    /// The path leads elsewhere or is invalid.
     #[error("the name of a file may not lead out of its folder")]
     Name,
     /// There is too much.
     #[error("an upload holds up to 20,000 files, 2 GiB in one file and 8 GiB in all")]
     TooMuch,
-    /// Others come already.
+    /// Too many others are in progress.
     #[error("{MOST_AT_A_TIME} files are coming already")]
     Busy,
-    /// Nothing comes any more.
+    /// No more data arrives.
     #[error("nothing came of a file for {seconds} s", seconds = PATIENCE.as_secs())]
     Stalled,
     /// The connection or the disk failed.
@@ -101,7 +101,7 @@ pub(crate) enum UploadError {
 }
 
 impl Uploads {
-    /// Into a folder of that of the sessions.
+    /// Into a folder inside that of the sessions.
     pub fn new(sessions: &Path) -> Self {
         Self { folder: folder(sessions), state: Mutex::default(), places: Semaphore::new(MOST_AT_A_TIME) }
     }
@@ -146,7 +146,7 @@ impl Uploads {
         outcome
     }
 
-    /// One more file of an upload, whose folder is made when the first one comes.
+    /// One more file of an upload, whose folder is created with the first one.
     fn begun<'a>(&'a self, upload: &'a str) -> Result<Coming<'a>, UploadError> {
         if upload.is_empty() || upload.len() > 40 || !upload.bytes().all(|byte| byte.is_ascii_alphanumeric()) {
             return Err(UploadError::Name);
@@ -196,7 +196,7 @@ impl Uploads {
         })
     }
 
-    /// What is to be opened of an upload: the one folder or file that was dropped, or all files that were.
+    /// What to open of an upload: the one dropped folder or file, or all dropped files.
     pub fn finished(&self, upload: &str) -> Option<PathBuf> {
         let folder = self.state().begun.get(upload)?.folder.clone();
         let mut entries = std::fs::read_dir(&folder).ok()?.filter_map(Result::ok);
@@ -207,7 +207,7 @@ impl Uploads {
     }
 }
 
-/// The path, if it is a relative one that goes only down.
+/// The path, if it is relative and does not go up.
 fn harmless(path: &str) -> Option<PathBuf> {
     let path = Path::new(path);
     let goes_down = path.components().all(|part| matches!(part, Component::Normal(_)));

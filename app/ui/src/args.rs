@@ -1,4 +1,4 @@
-//! `handeye gui`, as the command line has it.
+//! `handeye gui`, as on the command line.
 
 use clap::Args;
 use handeye_cell::scene::SceneChoice;
@@ -15,8 +15,7 @@ pub struct GuiArgs {
     /// settings if not given.
     #[arg(long, value_name = "FILE|NAME", conflicts_with_all = ["connect", "driver", "camera_driver"], help_heading = heading::CELL)]
     pub scene: Option<SceneChoice>,
-    /// How far the links of the built-in cell's arm are off those that its controller counts with; as the scene says if not
-    /// given.
+    /// How far the links of the built-in cell's arm differ from those that its controller uses; from the scene if not given.
     #[arg(long, value_name = "LEVEL", value_enum, conflicts_with_all = ["connect", "driver", "camera_driver"], help_heading = heading::CELL)]
     pub arm_errors: Option<ArmErrorsChoice>,
     /// Driver of the robot, or of robot and camera: a command, or tcp://HOST:PORT.
@@ -28,7 +27,7 @@ pub struct GuiArgs {
     /// Where its scene has the parts of the cell; as in the settings if not given.
     #[command(flatten)]
     pub objects: ObjectArgs,
-    /// File of boxes that the arm keeps out of, which is there and is written when they are changed; `keep_out.toml` beside the
+    /// File of boxes that the arm keeps out of, which is there and is written when they are changed; `keep_out.toml` next to the
     /// settings if not given.
     #[arg(long, value_name = "FILE", help_heading = heading::CELL)]
     pub keep_out: Option<std::path::PathBuf>,

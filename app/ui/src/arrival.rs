@@ -1,5 +1,5 @@
 //! Shows what a sequence of captures has led to: when it has ended and its answer is there, the pane of the step that is
-//! reached comes to the front. Once, and only if nobody is busy elsewhere.
+//! reached comes to the front. Once, and only if the user is not busy elsewhere.
 
 use handeye_session::Role;
 
@@ -18,14 +18,14 @@ struct Waits {
     step: Step,
     /// Whether it is still under way.
     under_way: bool,
-    /// Whether the user chose what is in front since it began.
+    /// Whether the user has chosen what is in front since it began.
     chosen: bool,
 }
 
 /// What the user is doing now.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Busy {
-    /// Text is typed, or a dialog is open: what was begun there goes on, and nothing else is of interest.
+    /// Text is typed, or a dialog is open: that continues undisturbed.
     pub elsewhere: bool,
     /// A button of the pointer is down: over in a moment.
     pub pointing: bool,
@@ -50,7 +50,7 @@ impl Arrival {
             return None;
         }
         if std::mem::take(&mut waits.under_way) && !is_complete(model) {
-            // Whoever stopped it has something else in mind.
+            // A user who stopped it wants to do something else.
             self.waits = None;
             return None;
         }
@@ -78,14 +78,14 @@ fn step_of(model: &Model) -> Option<Step> {
 /// Whether every pose was visited.
 fn is_complete(model: &Model) -> bool {
     let is_over = |sequence: &PoseSequence| {
-        // Between two poses of a guided sequence there is none under way either.
+        // Between two poses of a guided sequence no pose is under way either.
         let is_chosen = sequence.guided.as_ref().is_none_or(|guided| guided.ending.is_some());
         is_chosen && sequence.current().is_none()
     };
     model.sequence.as_ref().is_some_and(is_over)
 }
 
-/// Whether the answer is there, and counts the last captures.
+/// Whether the answer is there and includes the last captures.
 fn is_answered(model: &Model, step: Step) -> bool {
     let Some(solved) = model.solve.current() else { return false };
     let document = model.document();

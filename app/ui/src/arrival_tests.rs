@@ -67,7 +67,7 @@ fn a_tab_that_was_chosen_since_the_sequence_began_stays_in_front() {
     silent.click("Jog");
     silent.show_model(sequence_runs(sample::solved(), CapturePurpose::Calibrate, 10));
     assert!(is_in_front(&mut silent, Pane::Jog));
-    // Also by a key, and also another one than that which would be covered.
+    // Also by a key, and also if it is not the pane that would be covered.
     let mut silent = under_way(CapturePurpose::Calibrate);
     silent.press(egui::Modifiers::NONE, egui::Key::Num6);
     silent.show_model(sequence_runs(sample::solved(), CapturePurpose::Calibrate, 10));

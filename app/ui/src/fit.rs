@@ -1,13 +1,13 @@
-//! A window that is no larger than the screen it opens on.
+//! A window that is not larger than the screen it opens on.
 
 use egui::{Context, Pos2, Rect, Vec2, ViewportCommand, pos2, vec2};
 
 use super::LEAST_SIZE;
 
-/// Height that the bars of desktops take from the screen \[points\]; which ones there are, no window is told.
+/// Height that the bars of desktops take from the screen \[points\]; a window cannot find out which ones there are.
 const BARS: f32 = 48.0;
 
-/// Makes the window fit, as soon as its place is known; whether that was so.
+/// Makes the window fit, as soon as its place is known; whether it was known.
 pub fn fit(ctx: &Context) -> bool {
     let viewport = ctx.input(|input| input.viewport().clone());
     let (Some(monitor), Some(inner), Some(outer)) = (viewport.monitor_size, viewport.inner_rect, viewport.outer_rect)

@@ -52,7 +52,7 @@ fn group_ui<'a>(ui: &mut Ui, name: &str, actions: impl Iterator<Item = &'a Actio
     });
 }
 
-/// Keys as they look.
+/// Key caps.
 pub fn key_ui(ui: &mut Ui, keys: &str) {
     let palette = Palette::of(ui);
     Frame::new()

@@ -58,7 +58,8 @@ pub const SIZE: [f32; 2] = [1440.0, 900.0];
 /// Below this size panes no longer have room \[points\].
 pub const LEAST_SIZE: [f32; 2] = [1024.0, 700.0];
 
-/// Opens the window, after `begin` with its application, and returns when it is closed, by a person or by a signal that asks for the end.
+/// Opens the window, after `begin` with its application, and returns when it is closed, by the user or by a signal that requests
+/// the end.
 ///
 /// # Errors
 /// When `begin` fails, or no window can be opened, most likely because there is no screen.
@@ -81,7 +82,7 @@ pub fn run(args: GuiArgs, begin: opening::Begin) -> anyhow::Result<()> {
         let window = opening.window(&creation.egui_ctx, remembered, layout, None)?.that_heeds(signals);
         Ok(Box::new(window) as Box<dyn eframe::App>)
     };
-    // Layout and size of the window are kept in a folder of that name.
+    // Layout and size of the window are kept in a folder with that name.
     eframe::run_native(handeye_workbench::settings::FOLDER, options, Box::new(open)).map_err(|error| {
         anyhow::anyhow!(
             "cannot open a window: {error}; without a screen use `handeye serve` and a browser, or the subcommands, see \

@@ -1,4 +1,5 @@
-//! What a window is opened with, on the desktop and for a browser: command line, settings, and what the last one left.
+//! What a window is opened with, on the desktop and for a browser: command line, settings, and the state of the last
+//! one.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -17,10 +18,10 @@ use handeye_workbench::settings::{self, Settings, SettingsFile, Warning};
 use handeye_workbench::worker::Clock;
 use handeye_workbench::{messages, session};
 
-/// Name of the file of boxes beside the settings.
+/// Name of the file of boxes next to the settings.
 const KEEP_OUT_FILE: &str = "keep_out.toml";
 
-/// All that is known before there is a window.
+/// Everything that is known before there is a window.
 pub struct Opening {
     args: GuiArgs,
     file: SettingsFile,
@@ -31,14 +32,14 @@ pub struct Opening {
     begin: Begin,
 }
 
-/// What is done with the application before anything happens in it, as to have it recorded.
+/// What is done with the application before anything happens in it, such as starting a recording.
 pub type Begin = Box<dyn FnOnce(&mut App) -> anyhow::Result<()>>;
 
 impl Opening {
     /// Reads the settings; what cannot be read there is reported in the window.
     ///
     /// # Errors
-    /// When there are boxes that the arm keeps out of, or a scene that was asked for, and they cannot be read.
+    /// When the keep-out file or the requested scene exists and cannot be read.
     pub fn read(args: GuiArgs, begin: Begin) -> anyhow::Result<Self> {
         let (file, settings, warnings) = SettingsFile::open(settings::default_path(), variable);
         let drivers = Drivers { robot: args.driver.clone(), camera: args.camera_driver.clone() };
@@ -55,13 +56,13 @@ impl Opening {
         let objects = args.objects.paths(settings.objects.clone());
         let file = file.with_objects(&objects);
         if let Some(file) = &args.keep_out {
-            // A window that moves the arm without them would be worse than none.
+            // A window that moves the arm without them would be worse than no window.
             Surroundings::read(file)?;
         }
         Ok(Self { args, file, settings, warnings, source, objects, begin })
     }
 
-    /// The session to open, as the command line has it.
+    /// The session to open, from the command line.
     pub fn session(&self) -> Option<&std::path::Path> {
         self.args.session.as_deref()
     }

@@ -18,7 +18,7 @@ use handeye_workbench::tr;
 const WIDTH: f32 = 520.0;
 /// Height of a line.
 const ROW: f32 = 30.0;
-/// Lines that are seen at once.
+/// Lines that are visible at once.
 const ROWS: f32 = 11.0;
 
 /// Letters that can be typed; no command has a longer name.
@@ -118,7 +118,7 @@ fn row_ui(ui: &mut Ui, action: &Action, is_chosen: bool, language: Language) -> 
     response
 }
 
-/// The actions that fit what is typed, best first. English words find them in every language.
+/// The actions that match what is typed, best first. English words find them in every language.
 fn found(model: &Model, language: Language, typed: &str) -> Vec<Action> {
     let english = actions::all(model, Language::English);
     let mut found: Vec<_> = actions::all(model, language)
@@ -136,12 +136,12 @@ fn found(model: &Model, language: Language, typed: &str) -> Vec<Action> {
     found.into_iter().map(|(_, action)| action).collect()
 }
 
-/// How well a name fits the letters that were typed, which have to be in it in their order; `None` when they are not.
-/// Letters that follow each other count most, then first letters of words; letters that are jumped over cost.
+/// How well a name matches the typed letters, which must occur in it in order; `None` if they do not. Consecutive
+/// letters count most, then first letters of words; skipped letters cost.
 fn fit(name: &str, typed: &str) -> Option<i32> {
     let name: Vec<char> = name.to_lowercase().chars().collect();
     let begins_word = |at: usize| at == 0 || !name[at - 1].is_alphanumeric();
-    // For each place in the name the best score of the letters up to now, the last of which is there.
+    // For each place in the name the best score of the letters so far, the last of which is at this place.
     let mut ends: Option<Vec<Option<i32>>> = None;
     for letter in typed.to_lowercase().chars().filter(|letter| !letter.is_whitespace()) {
         let score = |at: usize| {

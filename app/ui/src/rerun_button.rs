@@ -13,7 +13,7 @@ use handeye_workbench::tr;
 /// Height of the button.
 const HEIGHT: f32 = 30.0;
 
-/// The button; what it would do, and how the recording is doing, stand in its hint.
+/// The button; what it would do and the state of the recording are in its hint.
 pub fn rerun_button_ui(ui: &mut Ui, rerun: &RerunState, language: Language, outbox: &mut Outbox) {
     let palette = Palette::of(ui);
     let ink = match rerun.viewer {

@@ -1,4 +1,4 @@
-//! Whether all that is written can be read in a small window, with a pointer and with fingers, in both languages.
+//! Whether all text can be read in a small window, with a pointer and with fingers, in both languages.
 
 use egui::accesskit::Role;
 use egui::epaint::{ClippedShape, Shape, TextShape};
@@ -28,7 +28,7 @@ fn texts<'a>(shape: &'a Shape, found: &mut Vec<&'a TextShape>) {
     }
 }
 
-/// Whether something is written somewhere with all of its letters in sight.
+/// Whether a text is shown somewhere completely.
 fn is_whole(silent: &Silent, words: &str) -> bool {
     silent.harness.output().shapes.iter().any(|ClippedShape { clip_rect, shape }| {
         let mut found = Vec::new();

@@ -1,7 +1,7 @@
 //! Images of the whole window in its main states, compared with those in `tests/snapshots`.
 //!
-//! They are drawn on the processor, by Mesa's llvmpipe through Vulkan, so that every machine draws the same. How much may
-//! differ stands in `kittest.toml`. After a change that is meant: `UPDATE_SNAPSHOTS=1 ./test -p handeye_ui --lib
+//! They are drawn on the processor, by Mesa's llvmpipe through Vulkan, so that every machine draws the same. The
+//! tolerance is set in `kittest.toml`. After an intended change: `UPDATE_SNAPSHOTS=1 ./test -p handeye_ui --lib
 //! snapshot`, and look at each image before it is committed.
 
 use std::sync::Arc;
@@ -21,11 +21,11 @@ use handeye_workbench::text::{Language, Text};
 /// Small enough for a repository, large enough for everything; the harness takes 8 of them at each edge \[points\].
 const SIZE: Vec2 = vec2(1280.0, 800.0);
 
-/// Draws on the processor through Vulkan; says why there is none on a machine that cannot.
+/// Draws on the processor through Vulkan; returns the reason on a machine that cannot.
 fn renderer() -> Result<WgpuTestRenderer, egui_wgpu::WgpuError> {
     let mut setup = WgpuSetupCreateNew::without_display_handle();
     setup.instance_descriptor.backends = wgpu::Backends::VULKAN;
-    // A graphics card rounds in its own way.
+    // A graphics card rounds differently.
     setup.native_adapter_selector = Some(Arc::new(|adapters, _surface| {
         let on_processor = |adapter: &&wgpu::Adapter| adapter.get_info().device_type == wgpu::DeviceType::Cpu;
         adapters.iter().find(on_processor).cloned().ok_or_else(|| "no Vulkan device on the processor".to_owned())
@@ -38,7 +38,7 @@ fn renderer() -> Result<WgpuTestRenderer, egui_wgpu::WgpuError> {
     Ok(WgpuTestRenderer::from_render_state(state))
 }
 
-/// What is to be seen.
+/// What is shown.
 struct State {
     model: Model,
     step: Option<Step>,
@@ -80,7 +80,7 @@ fn looks_like(name: &str, theme: ThemeChoice, language: Language, state: State) 
     let State { mut model, step, panes } = state;
     model.view.theme = theme;
     model.view.language = language;
-    // The harness keeps its sessions in another folder each time.
+    // The harness keeps its sessions in a different folder each time.
     model.sessions = "/home/me/handeye-sessions".into();
     silent.show_model(model);
     if let Some(step) = step {

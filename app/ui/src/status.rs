@@ -6,7 +6,7 @@ pub use handeye_workbench::model::STALE_AFTER_S;
 use handeye_workbench::model::{CellSource, Link, LinkState, Model, Simulation};
 use handeye_workbench::text::{Language, Text};
 
-/// How old what is shown of the robot is, where that is not how it is now.
+/// The age of the robot's state, if it is not current.
 pub fn robot_age(model: &Model) -> Option<Text> {
     if model.is_robot_live() {
         return None;
@@ -17,7 +17,7 @@ pub fn robot_age(model: &Model) -> Option<Text> {
     })
 }
 
-/// A pause \[s\] that is over before it is read.
+/// A pause \[s\] that is over before it can be read.
 const SOON_S: f64 = 2.0;
 
 /// A state for the user.
@@ -27,28 +27,28 @@ pub struct Status {
     pub tone: Tone,
     /// What it is, in a few words.
     pub title: Text,
-    /// Why, and what to do; empty when there is nothing to say.
+    /// Why, and what to do; empty if there is nothing to report.
     pub detail: Text,
     /// What the user can press.
     pub action: Option<Action>,
 }
 
-/// What helps.
+/// A remedy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
     /// Try to connect now.
     Reconnect,
-    /// Try to connect now, or start drivers no more.
+    /// Try to connect now, or stop restarting drivers.
     ReconnectOrStop,
-    /// Start drivers no more.
+    /// Stop restarting drivers.
     StopTrying,
     /// Let simulated time advance.
     StartSimulation,
-    /// Lets a paused simulation go on.
+    /// Let a paused simulation continue.
     ContinueSimulation,
 }
 
-/// The connection as a whole: that of its two halves which is worse off.
+/// The connection as a whole: the worse one of its two halves.
 pub fn connection(model: &Model) -> Status {
     let (camera, control) = (rank(&model.camera), rank(&model.control));
     let camera_first = lost_since_s(&model.camera) < lost_since_s(&model.control);
@@ -62,7 +62,7 @@ pub fn connection(model: &Model) -> Status {
     of_link(model, model.link(worse), half)
 }
 
-/// What the images need, when they are not live: a connection, or a simulation that runs.
+/// What the images need, when they are not live: a connection, or a running simulation.
 pub fn hindrance(model: &Model) -> Option<Status> {
     let connection = connection(model);
     if connection.tone != Tone::Good {
@@ -83,7 +83,7 @@ pub fn hindrance(model: &Model) -> Option<Status> {
     Some(Status { tone: Tone::Warning, title, detail, action: Some(action) })
 }
 
-/// What is between the start and the first image.
+/// What is missing between the start and the first image.
 pub fn before_first_image(model: &Model) -> Status {
     hindrance(model).unwrap_or_else(|| Status {
         tone: Tone::Busy,
@@ -173,7 +173,7 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
     }
 }
 
-/// A try of these starts a program, which a person may not want.
+/// A try starts a program, which the user may not want.
 fn may_be_given_up(model: &Model) -> bool {
     matches!(model.source, CellSource::Drivers(_))
 }
@@ -187,7 +187,7 @@ fn sentence(why: &Text, language: Language) -> Text {
     Text::verbatim(sentence_of(&why.in_language(language), if language == Language::Chinese { "。" } else { "." }))
 }
 
-/// First letter large, unless the first word is a name in code; full stop at the end.
+/// First letter in upper case, unless the first word is a name in code; full stop at the end.
 fn sentence_of(text: &str, full_stop: &'static str) -> String {
     let is_code =
         text.split_whitespace().next().is_some_and(|word| word.trim_end_matches(['.', ':']).contains(['.', '/']));

@@ -1,4 +1,4 @@
-//! How far the calibration has come: what is done, what can be done now, and what stands in the way.
+//! How far the calibration has come: what is done, what can be done now, and what is missing.
 
 use handeye_estimate::GOOD_VIEWS;
 use handeye_estimate::handeye::motion::MIN_VIEWS;
@@ -10,7 +10,7 @@ use handeye_wording::text;
 use handeye_workbench::model::{Model, Step};
 use handeye_workbench::text::Text;
 
-/// How a step is doing.
+/// The state of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StepState {
     /// There is nothing left to do.
@@ -32,7 +32,7 @@ pub struct StepStatus {
     pub line: Text,
 }
 
-/// All that the steps depend on.
+/// Everything that the steps depend on.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own, and any of them can be true")]
 pub struct Facts {
@@ -50,7 +50,7 @@ pub struct Facts {
     pub no_robot: bool,
     /// Captures that enter the fit.
     pub captures_in_use: usize,
-    /// The solver is at work.
+    /// The solver is running.
     pub solving: bool,
     /// There is an answer for the present captures.
     pub solved: bool,
@@ -68,16 +68,16 @@ pub struct Facts {
     pub exported: bool,
     /// The board is being tracked.
     pub tracking: bool,
-    /// It is, but it is not seen.
+    /// It is, but it is not visible.
     pub out_of_sight: bool,
 }
 
 impl Facts {
-    /// What the model says. The only place where the steps look at it.
+    /// The facts in the model. The only place where the steps read it.
     pub fn of(model: &Model) -> Self {
         let connected = model.control.is_connected() && model.camera.is_connected();
         let document = model.document();
-        // Not image by image: a blurred one says nothing.
+        // Not for each image: a single blurred one is no evidence.
         let seen_now = model.board_seen_s.is_some_and(|seen_s| model.now_s - seen_s < STALE_AFTER_S);
         let captured = model.observed.values().flatten().any(|observed| observed.corners.is_some());
         let current = model.solve.current();
@@ -128,7 +128,7 @@ fn judged(facts: &Facts) -> [StepStatus; 7] {
     })
 }
 
-/// The first step that can be done and is not. Nobody needs the board in view after the captures.
+/// The first step that can be done and is not done. The board does not have to be in view after the captures.
 pub fn next(steps: &[StepStatus]) -> Option<Step> {
     let is_done = |step| steps.iter().any(|status| status.step == step && status.state == StepState::Done);
     let comes_next = |status: &&StepStatus| {
@@ -149,7 +149,7 @@ fn connect(facts: &Facts) -> (StepState, Text) {
 fn target(facts: &Facts) -> (StepState, Text) {
     match (facts.board_in_view, facts.connected && facts.frame_seen, facts.board_captured) {
         (true, ..) => (StepState::Done, text!("Board in view")),
-        // A sequence may leave it on the way.
+        // A sequence may leave it during its motions.
         (false, true, true) if !facts.sequence_runs => (StepState::Now, text!("Board out of view")),
         (false, _, true) => (StepState::Done, text!("Board in the captures")),
         (false, true, false) => (StepState::Now, text!("Board not seen yet")),
@@ -262,7 +262,7 @@ mod tests {
         assert_eq!(reported(&facts)[3].0, StepState::Now);
     }
 
-    /// Of images alone there is a camera to export, and nothing of a robot to verify or to track with.
+    /// From images alone there is a camera to export, but no robot to verify or to track with.
     #[test]
     fn without_a_robot_the_export_comes_after_the_answer() {
         let facts = Facts { captures_in_use: 12, no_robot: true, solved: true, ..Facts::default() };

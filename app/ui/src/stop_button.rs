@@ -1,5 +1,5 @@
-//! STOP as something to press, and where it is: who listens to a page stops the arm without waiting for the frame in which
-//! the button would be seen to be pressed.
+//! STOP as a button, and where it is: the thread that listens to a page stops the arm without waiting for the frame in
+//! which the press would be seen.
 
 use egui::{Button, Color32, Context, Id, LayerId, Rect, Response, Ui};
 
@@ -12,9 +12,9 @@ use handeye_workbench::tr;
 pub struct StopPlaces {
     /// Where it is pressed \[points\].
     pub rects: Vec<Rect>,
-    /// The numbers by which screen readers press it.
+    /// The ids with which screen readers press it.
     pub controls: Vec<String>,
-    /// It has the keyboard: Enter and the space bar press it.
+    /// It has the keyboard focus: Enter and the space bar press it.
     pub has_keyboard: bool,
 }
 
@@ -29,7 +29,7 @@ fn id() -> Id {
     Id::new("where STOP is")
 }
 
-/// What is written on it, and its colours: whoever presses it has to know whether it can act.
+/// Its label and its colours: the user has to know whether it can act.
 pub(crate) struct Face {
     /// There is a connection to the arm.
     pub can_act: bool,
@@ -38,12 +38,12 @@ pub(crate) struct Face {
     pub fill: Color32,
     /// Colour of the words.
     pub ink: Color32,
-    /// What it does.
+    /// Its effect.
     pub hint: &'static str,
 }
 
 impl Face {
-    /// As things are; `name` is what is written on it when it can act.
+    /// For the present state; `name` is its label when it can act.
     pub fn of(ui: &Ui, model: &Model, name: &'static str) -> Self {
         let (palette, language) = (Palette::of(ui), model.view.language);
         if !model.control.is_connected() {
@@ -75,7 +75,7 @@ pub(crate) fn stop_button_ui(ui: &mut Ui, button: Button<'_>) -> Response {
     let rect = response.interact_rect.intersect(ui.clip_rect());
     let is_covered = |layer: LayerId| layer != ui.layer_id();
     if rect.is_positive() && !ui.ctx().layer_id_at(rect.center()).is_some_and(is_covered) {
-        // Whatever asks the context does so before its lock is taken.
+        // The context is queried before its lock is taken.
         let (frame, has_keyboard) = (ui.ctx().cumulative_frame_nr(), response.has_focus());
         ui.data_mut(|data| {
             let drawn = data.get_temp_mut_or_default::<Drawn>(id());

@@ -1,4 +1,4 @@
-//! How much text a person can put into the window at once. To lay text out takes time, and nothing else is drawn meanwhile.
+//! How much text can be entered into the window at once. Text layout takes time, and nothing else is drawn meanwhile.
 
 use egui::{Event, ImeEvent, RawInput};
 
@@ -20,7 +20,7 @@ pub fn bound(input: &mut RawInput) {
     }
 }
 
-/// Cuts a text after so many letters.
+/// Cuts a text after this many letters.
 pub fn cut(text: &mut String, most: usize) {
     if let Some((end, _)) = text.char_indices().nth(most) {
         text.truncate(end);
@@ -51,7 +51,7 @@ mod tests {
             let text = std::fs::read_to_string(&file).expect("a file");
             for made in text.split("TextEdit::").skip(1).filter(|made| made.contains("line(&mut")) {
                 let statement = made.split(';').next().unwrap_or_default();
-                // Text that cannot be changed is no field.
+                // Text that cannot be changed is not a field.
                 if !statement.starts_with("multiline(&mut text)") && made.starts_with(['s', 'm']) {
                     fields += 1;
                     assert!(statement.contains(".char_limit("), "{}: {statement}", file.display());

@@ -11,11 +11,11 @@ use handeye_workbench::worker::channels::Bell;
 /// What the workers report within this time is drawn at once: an image and the board in it, the robot's state.
 const GATHER: Duration = Duration::from_millis(20);
 
-/// What has a window drawn. egui's own way to ask for it waits while text is laid out, which may take longer than an arm may
-/// go on: only a thread of its own waits there.
+/// Makes a window redraw. egui's own request blocks while text is laid out, which may take longer than an arm may continue
+/// to move: only a thread of its own waits there.
 ///
 /// # Errors
-/// When the system has no more threads.
+/// When the system cannot start more threads.
 pub fn waker_of(ctx: &egui::Context) -> io::Result<Waker> {
     let (bell, rung) = Bell::new();
     let ctx = ctx.clone();
@@ -37,7 +37,7 @@ mod tests {
     fn whoever_wakes_the_window_does_not_wait_while_it_lays_out_text() {
         let ctx = egui::Context::default();
         let waker = waker_of(&ctx).expect("a thread");
-        // As long as this runs, egui answers nobody else.
+        // As long as this runs, egui answers no other request.
         ctx.data_mut(|_locked| {
             let woken = std::thread::spawn(move || (0..100).for_each(|_| waker()));
             woken.join().expect("it does not wait for this");

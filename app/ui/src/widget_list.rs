@@ -58,7 +58,7 @@ impl egui::Plugin for WidgetList {
     }
 }
 
-/// Replaces the file whole, and leaves to the system when it is on the disk: a frame does not wait for that.
+/// Replaces the file as a whole, and leaves it to the system when to write it to disk: a frame does not wait for that.
 fn replaced(file: &Path, list: &str) -> io::Result<()> {
     let partial = file.with_extension("partial");
     fs::write(&partial, list)?;

@@ -33,7 +33,7 @@ use handeye_workbench::{motion, recording, session, shell};
 /// Redraws at least this often, because ages and durations are shown.
 const CLOCK_PERIOD: Duration = Duration::from_millis(250);
 
-/// What is remembered from one start to the next besides settings and layout.
+/// What is remembered from one start to the next in addition to settings and layout.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Remembered {
@@ -49,7 +49,7 @@ impl Remembered {
     /// Key in eframe's storage.
     #[cfg(feature = "window")]
     const STORAGE_KEY: &str = "remembered";
-    /// So many sessions are remembered.
+    /// Number of sessions that are remembered.
     const SESSIONS: usize = 12;
 
     fn of(model: &Model) -> Self {
@@ -58,14 +58,14 @@ impl Remembered {
         Self { overlays, jog, capture, goal, recent }
     }
 
-    /// Settings with what is remembered here.
+    /// Settings with the values remembered here.
     pub(crate) fn view(&self, settings: ViewSettings) -> ViewSettings {
         let Self { overlays, jog, capture, goal, recent: _ } = self;
         ViewSettings { overlays: *overlays, jog: *jog, capture: *capture, goal: *goal, ..settings }
     }
 }
 
-/// Application, graphics, and what concerns nothing but the window: where panes are, which dialog is open.
+/// Application, graphics, and what concerns only the window: where panes are, which dialog is open.
 pub struct Window {
     app: App,
     textures: Textures,
@@ -75,12 +75,12 @@ pub struct Window {
     arrival: Arrival,
     palette: CommandPalette,
     settings: SettingsFile,
-    /// Whether the system asks for the end.
+    /// Whether the system requests the end.
     #[cfg(feature = "window")]
     signals: Option<Arc<Signals>>,
     #[cfg(feature = "window")]
     leaving: bool,
-    /// Whether it was looked at whether the window fits the screen.
+    /// Whether it has been checked that the window fits the screen.
     #[cfg(feature = "window")]
     is_fitted: bool,
 }
@@ -107,7 +107,7 @@ impl Window {
         }
     }
 
-    /// Closes when a signal asks for it.
+    /// Closes when a signal requests it.
     #[cfg(feature = "window")]
     #[must_use]
     pub(crate) fn that_heeds(self, signals: Arc<Signals>) -> Self {
@@ -115,7 +115,7 @@ impl Window {
         Self { signals: Some(signals), ..self }
     }
 
-    /// Closes the window if it is time; the arm need not wait for the last frames.
+    /// Closes the window if a signal has come; the arm need not wait for the last frames.
     #[cfg(feature = "window")]
     fn heed_signals(&mut self, ctx: &egui::Context) {
         if !self.leaving && self.signals.as_ref().is_some_and(|signals| signals.is_asked()) {
@@ -135,7 +135,7 @@ impl Window {
         }
     }
 
-    /// Draws everything and applies what the user asked for.
+    /// Draws everything and applies the user's commands.
     pub fn window_ui(&mut self, ui: &mut Ui) {
         if !fonts::are_there(ui.ctx()) {
             // The very first frame of a test; eframe draws its first frame with the fonts.
@@ -166,8 +166,8 @@ impl Window {
         }
     }
 
-    /// Esc stops the arm whatever else is going on. Only when there was nothing to break off, it closes what is open: who
-    /// closes a menu is not to end a sequence without knowing, and who stops an arm does not look at menus.
+    /// Esc stops the arm whatever else is going on. Only if there was nothing to stop, it closes what is open: closing a
+    /// menu must not end a sequence unnoticed, and a user who stops an arm does not look at menus.
     fn keyboard(&mut self, ctx: &egui::Context) {
         if ctx.input(|input| input.key_pressed(actions::STOP_KEY)) {
             self.outbox.send(motion::Command::Stop);
@@ -185,7 +185,7 @@ impl Window {
         }
     }
 
-    /// Shows what a sequence has led to, unless somebody is busy elsewhere.
+    /// Shows the result of a sequence, unless the user is busy elsewhere.
     fn arrive(&mut self, ctx: &egui::Context) {
         let model = self.app.model();
         let busy = Busy {
@@ -210,7 +210,7 @@ impl Window {
         for (command, place) in commands {
             tracing::trace!(?command, %place, "command");
             match command {
-                // A browser has the file manager of another machine.
+                // A browser runs on another machine than the file manager.
                 Command::Session(session::Command::OpenFolder(folder)) if self.app.model().in_browser => {
                     ctx.open_url(download(&folder));
                 }
@@ -227,7 +227,7 @@ impl Window {
         }
     }
 
-    /// Does what concerns the window; the rest is for the application.
+    /// Handles what concerns the window; the rest is passed to the application.
     pub(super) fn apply(&mut self, command: impl Into<Command>) {
         let command = command.into();
         match command {
@@ -249,7 +249,7 @@ impl Window {
         }
     }
 
-    /// What the next start begins with.
+    /// What the next start uses.
     pub fn remembered(&self) -> (Remembered, Layout) {
         (Remembered::of(self.app.model()), self.layout.clone())
     }
@@ -278,7 +278,7 @@ impl Window {
     }
 }
 
-/// Where a browser finds a folder as an archive.
+/// The address under which a browser downloads a folder as an archive.
 fn download(folder: &Path) -> egui::OpenUrl {
     let folder =
         percent_encoding::percent_encode(folder.as_os_str().as_encoded_bytes(), percent_encoding::NON_ALPHANUMERIC);
@@ -308,7 +308,7 @@ impl eframe::App for Window {
     }
 }
 
-/// As it was at the end of the last time; the first layout and the defaults where that cannot be read.
+/// As stored at the end of the last run; the initial layout and the defaults if that cannot be read.
 #[cfg(feature = "window")]
 pub fn stored(storage: Option<&dyn eframe::Storage>) -> (Remembered, Layout) {
     let Some(storage) = storage else { return Default::default() };

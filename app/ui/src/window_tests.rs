@@ -69,7 +69,7 @@ fn a_driver_that_is_gone_says_why_and_when_it_is_started_again_and_a_person_can_
     assert!(silent.harness.query_by_label("Stop trying").is_none());
 }
 
-/// A robot behind a driver is none of a simulator, whatever happens to it.
+/// A robot behind a driver is not part of a simulator, whatever happens to it.
 #[test]
 fn words_of_a_simulator_stand_nowhere_behind_a_driver() {
     let drivers = Drivers { robot: Some("python3 my_driver.py".to_owned()), camera: None };
@@ -89,7 +89,7 @@ fn words_of_a_simulator_stand_nowhere_behind_a_driver() {
                 assert!(!silent.sees(word), "{word} in {place}, armed {is_armed}");
             }
         };
-        // Where another cell is chosen the simulator is one of them, and where files are written it is who reads some.
+        // The pane that chooses a cell offers the simulator, and the pane that writes files names it as a reader.
         for pane in Pane::ALL.into_iter().filter(|pane| !matches!(pane, Pane::Connect | Pane::Export)) {
             silent.show(pane);
             if !silent.harness.state_mut().layout().is_in_front(Pane::Connect) {
@@ -284,7 +284,7 @@ fn esc_stops_the_arm_while_text_is_typed_and_while_a_dialog_is_open() {
     assert!(!silent.sees("Esc stops the arm at any time"));
 }
 
-/// A connection that is lost while the arm can still be moved: the images alone, say.
+/// A connection that is lost while the arm can still be moved: for example the images alone.
 #[test]
 fn what_says_why_images_are_not_live_moves_nothing_that_moves_the_arm() {
     let mut silent = Silent::live();

@@ -28,7 +28,7 @@ macro_rules! of_features {
     };
 }
 
-/// The features that can be asked for something.
+/// The features that accept commands.
 macro_rules! commands {
     ($($variant:ident($feature:ident),)*) => {
         of_features! {
@@ -131,12 +131,12 @@ impl Outbox {
         self.commands.push((command.into(), Location::caller()));
     }
 
-    /// Whether nobody asked for anything.
+    /// Whether there are no commands.
     pub fn is_empty(&self) -> bool {
         self.commands.is_empty()
     }
 
-    /// The commands in the order in which they were asked for.
+    /// The commands in the order in which they were sent.
     pub fn drain(&mut self) -> impl Iterator<Item = (Command, &'static Location<'static>)> + '_ {
         self.commands.drain(..)
     }

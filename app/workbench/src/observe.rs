@@ -46,7 +46,7 @@ pub enum ObserveError {
         rows: usize,
         /// Images that show it, or a part of the other one that looks like it.
         found: usize,
-        /// Images looked at.
+        /// Images searched.
         images: usize,
         /// Images that show the other one.
         seen: usize,

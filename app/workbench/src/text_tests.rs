@@ -44,7 +44,7 @@ fn literal(source: &str) -> Option<String> {
             '"' => return Some(reported),
             '\\' => match letters.next()? {
                 'n' => reported.push('\n'),
-                // A line that goes on: the indentation of the next one does not count.
+                // A continued line: the indentation of the next one does not count.
                 '\n' => while letters.next_if(|next| next.is_whitespace()).is_some() {},
                 other => reported.push(other),
             },

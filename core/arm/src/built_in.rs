@@ -1,8 +1,8 @@
-//! The arms that are built in: numbers that their maker publishes, and the model of a simulator.
+//! The arms that are built in: numbers that their manufacturer publishes, and the model of a simulator.
 //!
 //! Rows: Universal Robots, "DH parameters for calculations of kinematics and dynamics" (support article 45257). Ranges and
-//! speeds: the maker's technical data sheets of the CB3 and the e-series; every joint turns once either way, and the last
-//! one of the smallest arms without end.
+//! speeds: the manufacturer's technical data sheets of the CB3 and the e-series; every joint turns one revolution either
+//! way, and the last one of the smallest arms without limits.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -10,7 +10,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::{Arm, ArmKind, DhRow, JointRange};
 
-/// Rows of an arm of Universal Robots from the numbers that its maker publishes, metres.
+/// Rows of an arm of Universal Robots from the numbers that its manufacturer publishes, metres.
 const fn ur([d1, a2, a3, d4, d5, d6]: [f64; 6]) -> [DhRow; 6] {
     [
         DhRow::new([0.0, FRAC_PI_2, d1, 0.0]),
@@ -52,7 +52,7 @@ impl ArmKind {
         let speeds_deg = match self {
             Self::Ur3 | Self::Ur3e => [180.0, 180.0, 180.0, 360.0, 360.0, 360.0],
             Self::Ur5 | Self::Ur5e => [180.0; 6],
-            // What the joints of the model store.
+            // The values stored in the joints of the model.
             Self::Ur5Coppeliasim => [90.0; 6],
             Self::Ur10 | Self::Ur10e | Self::Ur16e => [120.0, 120.0, 180.0, 180.0, 180.0, 180.0],
         };
@@ -63,8 +63,8 @@ impl ArmKind {
         ranges
     }
 
-    /// The arm with its ranges. The UR5 of CoppeliaSim stands as its model does; any other in the frame of its first row,
-    /// with the tip at the end of its last one.
+    /// The arm with its ranges. The UR5 of CoppeliaSim has the base frame of its model; any other the frame of its first
+    /// row, with the tip at the end of its last one.
     pub fn arm(self) -> Arm {
         let arm = Arm::from_dh(&self.rows()).and_then(|arm| arm.with_ranges(&self.ranges()));
         let arm = arm.expect("built-in numbers are those of an arm; a test makes each");

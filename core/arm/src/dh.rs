@@ -1,4 +1,4 @@
-//! Arms that are given as rows of Denavit and Hartenberg.
+//! Arms that are given as Denavit–Hartenberg rows.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
@@ -18,12 +18,12 @@ pub struct DhRow {
 }
 
 impl DhRow {
-    /// From `[a, alpha, d, theta]`, metres and radians.
+    /// A row from `[a, alpha, d, theta]`, metres and radians.
     pub(crate) const fn new([a_m, alpha_rad, d_m, theta_offset_rad]: [f64; 4]) -> Self {
         Self { a_m, alpha_rad, d_m, theta_offset_rad }
     }
 
-    /// What follows the turn of the joint: the shift along its axis, the common normal and the twist about that.
+    /// The transform after the turn of the joint: the shift along its axis, the common normal and the twist about that.
     fn link(&self) -> Isometry3<f64> {
         let twist = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), self.alpha_rad);
         Isometry3::from_parts(Translation3::new(self.a_m, 0.0, self.d_m), twist)
@@ -35,7 +35,7 @@ impl DhRow {
         Isometry3::from_parts(Translation3::identity(), turn)
     }
 
-    /// The first number that no arm has, with its name.
+    /// The first number that is not valid for an arm, with its name.
     fn defect(&self) -> Option<(&'static str, f64)> {
         let lengths = [("a", self.a_m), ("d", self.d_m)].map(|(name, value)| (name, value, LONGEST_LINK_M));
         let angles = [("alpha", self.alpha_rad), ("theta", self.theta_offset_rad)]
@@ -47,8 +47,8 @@ impl DhRow {
 }
 
 impl Arm {
-    /// An arm of revolute joints by its rows, from the base to the tip. It stands in the base, its tip is the end of its
-    /// last row, and its joints, `q1`, `q2`, …, have no limits.
+    /// An arm of revolute joints by its rows, from the base to the tip. Its first row begins in the base, its tip is the
+    /// end of its last row, and its joints, `q1`, `q2`, …, have no limits.
     ///
     /// `first_from_flange = Π_j Rz(q_j + theta_offset_j) · Tz(d_j) · Tx(a_j) · Rx(alpha_j)`
     ///

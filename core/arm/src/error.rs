@@ -1,4 +1,4 @@
-//! Why an arm, or joint values of it, are of no use.
+//! Why an arm, or joint values of it, are not usable.
 
 use super::MAX_JOINTS;
 
@@ -9,16 +9,16 @@ pub enum JointDefect {
     /// NaN or infinite.
     #[error("where it sits has a number that is not finite")]
     NotFinite,
-    /// Farther from the one before it than in any arm.
+    /// Farther from the previous joint than in any arm.
     #[error("it is {length_m} m from its neighbour; lengths are in metres")]
     TooLong {
         /// Distance, metres.
         length_m: f64,
     },
-    /// No direction.
+    /// An axis without a direction.
     #[error("its axis has no direction")]
     Axis,
-    /// No room to move.
+    /// A range without room to move.
     #[error("it goes from {min} to {max} at {speed} a second; it needs a range with room, and a speed above zero")]
     Range {
         /// Smallest value.
@@ -30,7 +30,7 @@ pub enum JointDefect {
     },
 }
 
-/// Why an arm, or joint values with it, cannot be computed with.
+/// Why an arm, or joint values with it, are not usable.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum ArmError {
@@ -40,22 +40,22 @@ pub enum ArmError {
         /// Joints given.
         got: usize,
     },
-    /// A number of a row that no arm has.
+    /// A number of a row that is not valid for an arm.
     #[error("{name} of joint {joint} is {value}: lengths are in metres, angles in radians, at most one turn")]
     BadRow {
         /// The joint, counted from 1.
         joint: usize,
-        /// Which number.
+        /// Name of the number.
         name: &'static str,
-        /// The number as it was given: metres or radians.
+        /// The number as given: metres or radians.
         value: f64,
     },
-    /// A joint that no arm has.
+    /// A joint that is not valid for an arm.
     #[error("joint {joint} ({name}): {defect}")]
     BadJoint {
         /// The joint, counted from 1.
         joint: usize,
-        /// What it is called.
+        /// Its name.
         name: String,
         /// What is wrong with it.
         defect: JointDefect,

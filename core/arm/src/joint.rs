@@ -1,17 +1,17 @@
-//! One joint of an arm: where it sits, how it moves, and how far.
+//! One joint of an arm: its place, its kind of motion, and its range.
 
 use std::fmt;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// How a joint moves what is behind it.
+/// Kind of motion of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum JointKind {
-    /// Turns it about its axis. Its value is an angle in radians.
+    /// Turns what is behind it about its axis. Its value is an angle in radians.
     Revolute,
-    /// Shifts it along its axis. Its value is a length in metres.
+    /// Shifts what is behind it along its axis. Its value is a length in metres.
     Prismatic,
 }
 
@@ -24,13 +24,13 @@ impl fmt::Display for JointKind {
     }
 }
 
-/// How far and how fast a joint moves: radians and rad/s of a revolute one, metres and m/s of a prismatic one. Infinite
-/// where there is no limit, or none is known.
+/// How far and how fast a joint moves: radians and rad/s for a revolute one, metres and m/s for a prismatic one.
+/// Infinite where there is no limit, or none is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointRange {
-    /// Smallest value, itself allowed.
+    /// Smallest value, inclusive.
     pub min: f64,
-    /// Largest value, itself allowed.
+    /// Largest value, inclusive.
     pub max: f64,
     /// Largest speed either way.
     pub speed: f64,
@@ -40,7 +40,7 @@ impl JointRange {
     /// A joint without limits.
     pub const ENDLESS: Self = Self { min: f64::NEG_INFINITY, max: f64::INFINITY, speed: f64::INFINITY };
 
-    /// Rounding by which a value may exceed its limit: a joint driven to its stop is not outside.
+    /// Rounding by which a value may exceed its limit: a joint at its stop is not outside.
     pub(super) const SLACK: f64 = 1e-9;
 
     /// Whether a value is in the range; NaN is not.
@@ -53,7 +53,7 @@ impl JointRange {
         value.max(self.min).min(self.max)
     }
 
-    /// What no joint has: no room at all, NaN, or no speed.
+    /// Whether the range is valid: not without room, NaN, or without speed.
     pub(super) fn is_sound(&self) -> bool {
         // Infinity as the smallest value, or its opposite as the largest, leaves no finite one.
         self.min <= self.max && self.min < f64::INFINITY && self.max > f64::NEG_INFINITY && self.speed > 0.0
@@ -63,12 +63,12 @@ impl JointRange {
 /// A joint, in the frame that the joint before it carries.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint {
-    /// What it is called where it comes from, for messages.
+    /// Its name in its source, for messages.
     pub name: String,
     /// How it moves.
     pub kind: JointKind,
-    /// Frame of the joint at rest, in the frame that the joint before it carries; of the first joint, in the frame in
-    /// which the arm stands. A point of the axis is its origin.
+    /// Frame of the joint at rest, in the frame that the joint before it carries; for the first joint, in the frame in
+    /// which the arm is mounted. A point of the axis is its origin.
     pub previous_from_joint: Isometry3<f64>,
     /// Direction of the axis in the frame of the joint.
     pub axis: UnitVector3<f64>,

@@ -1,13 +1,13 @@
-//! Serial arms: where the tip is for some joint values, how it moves with each of them, and which values put it at a pose.
+//! Serial arms: the tip pose for joint values, its derivatives by them, and the values that put it at a pose.
 //!
 //! # Model
-//! A chain of revolute and prismatic joints. Joint `j` sits at a fixed transform `P_j` behind the one before it and moves
+//! A chain of revolute and prismatic joints. Joint `j` is at a fixed transform `P_j` behind the one before it and moves
 //! what is behind it along or about its axis, `M_j(q_j)`:
 //!
 //! `base_from_tip = base_from_first · Π_j P_j · M_j(q_j) · last_from_flange · flange_from_tip`
 //!
-//! There is one such type, [`Arm`], wherever the numbers come from: rows of Denavit and Hartenberg ([`Arm::from_dh`]), a
-//! robot that is built in ([`ArmKind`]), a URDF file ([`urdf::Urdf`]).
+//! There is one such type, [`Arm`], for all sources of the numbers: Denavit–Hartenberg rows ([`Arm::from_dh`]), a robot
+//! that is built in ([`ArmKind`]), a URDF file ([`urdf::Urdf`]).
 //!
 //! # Derivatives
 //! Let `z_j` be the direction of the axis of joint `j` and `p_j` a point of it, in the base, and the tip be at `t` with axes
@@ -16,11 +16,11 @@
 //! - revolute joint with `ξ_j = [Rᵀ (z_j × (t − p_j)); Rᵀ z_j]`,
 //! - prismatic joint with `ξ_j = [Rᵀ z_j; 0]`.
 //!
-//! This needs the axes and where the tip *is*, not what is between flange and tip: with the tip pose that the controller
-//! reports, the tool need not be known ([`Arm::tip_from_joints`]).
+//! This needs the axes and the pose of the tip, not the transform between flange and tip: with the tip pose that the
+//! controller reports, the tool need not be known ([`Arm::tip_from_joints`]).
 //!
-//! What errors of an arm do to a calibration, and which of them it can find, is in `docs/maths/arm_errors.md`; which arms
-//! there are, and where their numbers come from, in `docs/reference/arms.md`.
+//! The effect of errors of an arm on a calibration, and which of them it can find, is in `docs/maths/arm_errors.md`; the
+//! arms that are built in, and the sources of their numbers, in `docs/reference/arms.md`.
 //!
 //! # Reference
 //! Denavit & Hartenberg 1955; Siciliano et al. 2009, "Robotics: modelling, planning and control", §2.8.2 (rows) and
@@ -71,10 +71,10 @@ pub use values::JointValues;
 
 /// Most joints of an arm: twice those of a usual one.
 pub const MAX_JOINTS: usize = 12;
-/// Longest link in metres: longer than any arm that is made, and shorter than a millimetre taken for a metre.
+/// Longest link in metres: longer than any real arm, and shorter than a millimetre taken for a metre.
 const LONGEST_LINK_M: f64 = 10.0;
 
-/// A serial arm: its joints, where it stands, and where its tip is.
+/// A serial arm: its joints, its place, and its tip.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(into = "record::ArmRecord", try_from = "record::ArmRecord")]
 pub struct Arm {
@@ -85,11 +85,11 @@ pub struct Arm {
     ur: Option<inverse::UrGeometry>,
     /// Where the first joint's fixed transform begins, in the base.
     pub base_from_first: Isometry3<f64>,
-    /// Where the tip is behind the flange.
+    /// Pose of the tip in the flange.
     pub flange_from_tip: Isometry3<f64>,
 }
 
-/// Where every part of an arm is for one configuration, in the base.
+/// Poses of every part of an arm for one configuration, in the base.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmFrames {
     /// Frame of each joint at rest, before its own motion: a point of its axis is the origin.
@@ -101,7 +101,7 @@ pub struct ArmFrames {
 }
 
 impl Arm {
-    /// An arm that stands in the base, with the tip at its flange.
+    /// An arm mounted in the base, with the tip at its flange.
     ///
     /// # Errors
     /// [`ArmError::JointCount`] and [`ArmError::BadJoint`].
@@ -115,7 +115,7 @@ impl Arm {
             if let Some(defect) = defect_of(&joint.previous_from_joint) {
                 return Err(bad(defect));
             }
-            // A zero vector that was made a unit one is not a number.
+            // A normalised zero vector is NaN.
             if !joint.axis.iter().all(|v| v.is_finite()) {
                 return Err(bad(JointDefect::Axis));
             }
@@ -135,7 +135,7 @@ impl Arm {
         Ok(Self { ur, ..arm })
     }
 
-    /// The same arm, standing elsewhere and with another tool.
+    /// The same arm, mounted elsewhere and with another tool.
     #[must_use]
     pub fn mounted(self, base_from_first: Isometry3<f64>, flange_from_tip: Isometry3<f64>) -> Self {
         Self { base_from_first, flange_from_tip, ..self }
@@ -159,11 +159,11 @@ impl Arm {
         Ok(self)
     }
 
-    /// The same arm with its joints elsewhere: what entry `j` says of joint `j` in its frame at rest with z along the axis, as
-    /// [`Self::tip_from_joints`] has it. The axes stay what they are in that frame.
+    /// The same arm with its joints displaced: entry `j` is the displacement of joint `j` in its frame at rest with z along
+    /// the axis, as in [`Self::tip_from_joints`]. The axes do not change in that frame.
     ///
     /// # Errors
-    /// [`ArmError::WrongCount`], and [`ArmError::BadJoint`] for a place that no joint has.
+    /// [`ArmError::WrongCount`], and [`ArmError::BadJoint`] for a place that is not valid for a joint.
     pub fn displaced(&self, joint_from_moved: &[Isometry3<f64>]) -> Result<Self, ArmError> {
         if joint_from_moved.len() != self.joints.len() {
             return Err(ArmError::WrongCount { got: joint_from_moved.len(), need: self.joints.len() });
@@ -197,13 +197,13 @@ impl Arm {
         self.joints.len()
     }
 
-    /// The first joint, counted from 0, whose value is out of its range or not a number; a joint without a value has none
-    /// in its range.
+    /// The first joint, counted from 0, whose value is out of its range or NaN; a joint without a value counts as out of
+    /// its range.
     pub fn first_violation(&self, joints: &[f64]) -> Option<usize> {
         (0..self.joints.len()).find(|&i| joints.get(i).is_none_or(|&value| !self.joints[i].range.contains(value)))
     }
 
-    /// Where the tip is with these joint values, radians and metres.
+    /// Pose of the tip with these joint values, radians and metres.
     ///
     /// # Errors
     /// [`ArmError::WrongCount`] and [`ArmError::NotFinite`].
@@ -213,7 +213,7 @@ impl Arm {
         Ok(Pose::from_isometry(base_from_flange * self.flange_from_tip))
     }
 
-    /// Where every joint and every link is.
+    /// Poses of every joint and every link.
     ///
     /// # Errors
     /// As [`Self::forward`].
@@ -241,8 +241,8 @@ impl Arm {
         Ok(Matrix6xX::from_columns(&columns))
     }
 
-    /// How the tip moves with each joint: entry `j` is the twist `[t; r]` in metres and radians per radian, or per metre,
-    /// with which joint `j` perturbs `base_from_tip` on the right, at the tip pose of [`Self::forward`].
+    /// Derivative of the tip pose by each joint: entry `j` is the twist `[t; r]` in metres and radians per radian, or per
+    /// metre, with which joint `j` perturbs `base_from_tip` on the right, at the tip pose of [`Self::forward`].
     ///
     /// # Errors
     /// As [`Self::forward`].
@@ -252,9 +252,9 @@ impl Arm {
         Ok(twists(&axes, &(base_from_flange * self.flange_from_tip)))
     }
 
-    /// The joints at rest in the frame of the tip, as [`View::tip_from_joints`] has them: a frame for each whose z axis it turns
-    /// about. At the tip pose that the controller reports: of the arm, `flange_from_tip` does not matter and `base_from_first`
-    /// does; `handeye_estimate::placement` finds it.
+    /// The joints at rest in the frame of the tip, as in [`View::tip_from_joints`]: for each a frame about whose z axis it
+    /// turns. The tip pose is the one that the controller reports: `flange_from_tip` of the arm does not matter,
+    /// `base_from_first` does; `handeye_estimate::placement` finds it.
     ///
     /// [`View::tip_from_joints`]: handeye_geometry::targets::observation::View::tip_from_joints
     ///
@@ -284,8 +284,8 @@ impl Arm {
         }
     }
 
-    /// Goes along the chain: the number of a joint, its frame at rest and the frame that it carries. Gives the flange. All
-    /// in the base; there must be a value for every joint.
+    /// Visits the joints along the chain: the number of a joint, its frame at rest and the frame that it carries. Returns
+    /// the flange. All in the base; there must be a value for every joint.
     fn walk(&self, joints: &[f64], mut visit: impl FnMut(usize, &Isometry3<f64>, &Isometry3<f64>)) -> Isometry3<f64> {
         let mut base_from_link = self.base_from_first;
         for (i, (joint, &value)) in self.joints.iter().zip(joints).enumerate() {
@@ -304,7 +304,7 @@ impl Arm {
     }
 }
 
-/// What no place on an arm has.
+/// Why a transform is not a valid place on an arm.
 fn defect_of(transform: &Isometry3<f64>) -> Option<JointDefect> {
     let is_finite = transform.translation.vector.iter().chain(transform.rotation.coords.iter()).all(|v| v.is_finite());
     if !is_finite {

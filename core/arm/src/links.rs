@@ -1,8 +1,8 @@
-//! The links of any arm as capsules, for those that draw it and those that keep it out of the way.
+//! The links of any arm as capsules, for drawing and for collision checks.
 //!
-//! A chain of joints says where axes are, not what hangs between them. So each link is taken for a tube from where its own
-//! joint sits to where the next one does, or its shortest way around: an arm that runs beside its axes, as those of
-//! Universal Robots do, is thicker and to one side of that. Of a prismatic joint the rail is not there.
+//! A chain of joints defines the axes, not the bodies between them. So each link is modelled as a tube from the place of
+//! its own joint to that of the next one, or the shortest connection: an arm whose links are offset from its axes, like
+//! those of Universal Robots, is thicker and to one side of that. The rail of a prismatic joint is not included.
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
@@ -16,13 +16,13 @@ const SHORTEST_M: f64 = 1e-3;
 /// A tube with round ends that moves with one link.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinkCapsule {
-    /// How many joints carry it.
+    /// Number of joints that carry it.
     pub link: usize,
     /// One end, in the frame of the link, see [`arm_from_links`].
     pub from: Point3<f64>,
     /// The other.
     pub to: Point3<f64>,
-    /// Metres.
+    /// Radius, metres.
     pub radius_m: f64,
 }
 
@@ -42,7 +42,7 @@ pub fn capsules(arm: &Arm) -> Vec<LinkCapsule> {
     let ends = places.windows(2).zip(links).enumerate();
     ends.filter(|(_, (ends, _))| (ends[1] - ends[0]).norm() > SHORTEST_M)
         .map(|(link, (ends, arm_from_link))| {
-            // A tube about the axis of the first joint turns in its place: it belongs to what stands.
+            // A tube about the axis of the first joint turns in place: it belongs to the fixed base.
             let link = if link == 1 && first_axis.is_some_and(|axis| ends.iter().all(|end| is_on(end, &axis))) {
                 0
             } else {
@@ -60,7 +60,7 @@ fn is_on(point: &Point3<f64>, (of_axis, direction): &(Point3<f64>, Unit<Vector3<
     direction.cross(&(point - of_axis)).norm() < SHORTEST_M
 }
 
-/// Where the links are, counted from the base, which does not move.
+/// Poses of the links, counted from the base, which does not move.
 pub fn arm_from_links(frames: &ArmFrames) -> impl Iterator<Item = Isometry3<f64>> {
     std::iter::once(Isometry3::identity()).chain(frames.base_from_link.iter().copied())
 }

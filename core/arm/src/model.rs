@@ -1,24 +1,24 @@
-//! Which arm it is, as files say it.
+//! Which arm it is, as stated in files.
 
 use serde::{Deserialize, Serialize};
 
 use super::{Arm, ArmError, DhRow};
 
-/// An arm as a session names it: `{"kind": "ur5"}`, `{"dh": [[a, alpha, d, theta], …]}` or `{"chain": {…}}`.
+/// An arm as named in a session: `{"kind": "ur5"}`, `{"dh": [[a, alpha, d, theta], …]}` or `{"chain": {…}}`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ArmModel {
     /// One that is built in.
     Kind(ArmKind),
-    /// Rows of Denavit and Hartenberg in the standard convention: `[a, alpha, d, theta]`, where theta is added to the
-    /// joint angle; metres and radians.
+    /// Denavit–Hartenberg rows in the standard convention: `[a, alpha, d, theta]`, where theta is added to the joint
+    /// angle; metres and radians.
     Dh(Vec<[f64; 4]>),
     /// One that was read from a URDF file or from a cell.
     Chain(Box<Arm>),
 }
 
-/// An arm that is built in. Those of Universal Robots are as their manufacturer's table has them, with the joint angles
-/// that the controller shows.
+/// An arm that is built in. Those of Universal Robots are as in their manufacturer's table, with the joint angles that
+/// the controller shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ArmKind {
@@ -62,10 +62,10 @@ impl ArmKind {
 }
 
 impl ArmModel {
-    /// The arm; where it stands and its tool are for `handeye_estimate::placement::place` to find.
+    /// The arm; where it is mounted and its tool are found by `handeye_estimate::placement::place`.
     ///
     /// # Errors
-    /// [`ArmError`] for rows that no arm has.
+    /// [`ArmError`] for rows that are not valid for an arm.
     pub fn arm(&self) -> Result<Arm, ArmError> {
         match self {
             Self::Kind(kind) => Ok(kind.arm()),

@@ -1,11 +1,11 @@
-//! A joint value as a person reads it: degrees, or millimetres of a prismatic joint.
+//! A joint value in display units: degrees, or millimetres for a prismatic joint.
 
 use std::fmt;
 
 use super::JointKind;
 
 impl JointKind {
-    /// How many of the units that a person reads, degrees or millimetres, are in a radian or a metre.
+    /// Display units, degrees or millimetres, per radian or metre.
     pub fn shown_per_si(self) -> f64 {
         match self {
             Self::Revolute => 180.0 / std::f64::consts::PI,
@@ -13,7 +13,7 @@ impl JointKind {
         }
     }
 
-    /// What follows such a number.
+    /// The unit after such a number.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Revolute => "°",
@@ -28,12 +28,12 @@ impl JointKind {
 }
 
 /// A value of a joint, or a difference or a speed of one. Written in degrees or millimetres, with two decimals where the
-/// format does not say how many.
+/// format does not give a precision.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointQuantity {
     /// Whether it turns or slides.
     pub kind: JointKind,
-    /// Radians, or metres of a prismatic joint.
+    /// Radians, or metres for a prismatic joint.
     pub value: f64,
 }
 

@@ -1,11 +1,11 @@
-//! An arm as plain data, for who keeps or sends one: its joints with their ranges, and what is at its two ends.
+//! An arm as plain data, to store or to send: its joints with their ranges, and the transforms at its two ends.
 
 use nalgebra::{Isometry3, UnitVector3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{Arm, ArmError, Joint, JointKind, JointRange};
 
-/// How far the length of a unit vector may be from one, by rounding.
+/// Largest deviation of the length of a unit vector from one, by rounding.
 const UNIT: f64 = 1e-12;
 
 #[derive(Serialize, Deserialize)]
@@ -22,7 +22,7 @@ struct JointRecord {
     kind: JointKind,
     previous_from_joint: Isometry3<f64>,
     axis: Vector3<f64>,
-    // What is not there has no limit: text formats have no infinity.
+    // A missing number means no limit: text formats have no infinity.
     min: Option<f64>,
     max: Option<f64>,
     speed: Option<f64>,
@@ -53,7 +53,7 @@ impl TryFrom<ArmRecord> for Arm {
             name: joint.name,
             kind: joint.kind,
             previous_from_joint: joint.previous_from_joint,
-            // One that is a unit vector stays as it is to the last bit; that of nothing is refused below.
+            // A unit vector is kept to the last bit; a zero vector is refused below.
             axis: if (joint.axis.norm() - 1.0).abs() < UNIT {
                 UnitVector3::new_unchecked(joint.axis)
             } else {

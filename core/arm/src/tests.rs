@@ -12,7 +12,7 @@ fn model_ur5() -> Arm {
     ArmModel::Kind(ArmKind::Ur5Coppeliasim).arm().expect("built in")
 }
 
-/// An arm on a table with a tool, neither of which is at the origin of anything.
+/// An arm on a table with a tool, neither of which is at an origin.
 fn mounted() -> Arm {
     let foot = se3::exp(&Vector6::new(0.4, -0.2, 0.7, 0.3, -0.2, 1.1));
     let tool = se3::exp(&Vector6::new(0.01, 0.03, 0.12, -0.4, 0.2, 0.5));
@@ -42,7 +42,7 @@ fn the_ur5_of_the_manufacturer_is_where_its_table_puts_it() {
     let tip = arm.forward(&[0.0; 6]).expect("six joints");
     let expected = Vector3::new(-0.425 - 0.392_25, -0.109_15 - 0.0823, 0.089_159 - 0.094_65);
     assert!((tip.translation() - expected).norm() < 1e-14, "{tip:?}");
-    // Upright: the links and d5 add up over the shoulder, the wrist stays beside.
+    // Upright: the links and d5 add up above the shoulder, the wrist stays to the side.
     let up = arm.forward(&[0.0, -PI / 2.0, 0.0, -PI / 2.0, 0.0, 0.0]).expect("six joints");
     let expected = Vector3::new(0.0, -0.191_45, 0.089_159 + 0.425 + 0.392_25 + 0.094_65);
     assert!((up.translation() - expected).norm() < 1e-12, "{up:?}");
@@ -89,7 +89,7 @@ fn twists_are_the_central_differences_of_the_forward_kinematics() {
     }
 }
 
-/// A chain with both kinds of joints, axes along nothing, and a tool.
+/// A chain with both kinds of joints, skew axes, and a tool.
 fn askew() -> Arm {
     let place = |numbers: [f64; 6]| se3::exp(&Vector6::from(numbers));
     let joint = |kind, numbers, axis: [f64; 3]| Joint {
@@ -153,8 +153,8 @@ fn twists_and_jacobian_of_both_kinds_of_joints_are_the_central_differences() {
 
 #[test]
 fn the_arms_of_universal_robots_are_where_the_maker_puts_them() {
-    // The maker's table again, in millimetres: shoulder height, upper arm, forearm, and how far the wrist is beside, below
-    // and in front. Where that puts the tip is read off the arm's drawing.
+    // The manufacturer's table again, in millimetres: shoulder height, upper arm, forearm, and the offsets of the wrist to
+    // the side, below and in front. The resulting place of the tip is read off the arm's drawing.
     let published = [
         (ArmKind::Ur3, [151.9, 243.65, 213.25, 112.35, 85.35, 81.9]),
         (ArmKind::Ur5, [89.159, 425.0, 392.25, 109.15, 94.65, 82.3]),

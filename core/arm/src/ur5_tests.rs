@@ -1,4 +1,4 @@
-//! CoppeliaSim's UR5: its geometry as the model has it, and its configurations in closed form.
+//! CoppeliaSim's UR5: its geometry as in the model, and its configurations in closed form.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::LazyLock;
@@ -15,7 +15,7 @@ type JointAngles = [f64; 6];
 
 static ARM: LazyLock<Arm> = LazyLock::new(|| ArmKind::Ur5Coppeliasim.arm());
 
-/// Where everything is in the frame of the model, 14.65 mm above the mounting plane.
+/// Poses of all parts in the frame of the model, 14.65 mm above the mounting plane.
 #[expect(clippy::struct_field_names, reason = "all of it is in the frame of the arm")]
 struct ArmPose {
     arm_from_joint: Vec<Isometry3<f64>>,
@@ -37,7 +37,7 @@ fn inverse_all(goal: &Isometry3<f64>) -> Vec<JointAngles> {
     found.into_iter().map(|joints| joints.try_into().unwrap()).collect()
 }
 
-/// One turn either way for every joint, as the stock model has it.
+/// One revolution either way for every joint, as in the stock model.
 fn turns() -> [JointRange; 6] {
     ArmKind::Ur5Coppeliasim.ranges()
 }
@@ -53,14 +53,14 @@ fn inverse_nearest(
 
 /// Rounding of a chain of a dozen products of numbers around one.
 const ROUNDING: f64 = 1e-14;
-/// What a closed form promises.
+/// Accuracy of a closed form.
 const EXACT: f64 = 1e-12;
 
 fn miss(joints: &JointAngles, goal: &Isometry3<f64>) -> f64 {
     pose_error(&forward(joints).arm_from_connection, goal).norm()
 }
 
-/// What [`Arm::descend`] finds for a tool on the connection.
+/// Result of [`Arm::descend`] for a tool on the connection.
 fn descend(
     goal: &Isometry3<f64>,
     tool: &Isometry3<f64>,
@@ -187,7 +187,7 @@ proptest! {
     fn the_nearest_configuration_to_a_seed_beside_it_is_itself(
         joints in any_joints(), nudge in proptest::array::uniform6(-0.01..0.01),
     ) {
-        // Beside a singularity two branches are as near as the nudge; there is nothing to choose between them.
+        // Close to a singularity two branches are as close as the nudge; neither is the better choice.
         prop_assume!(jacobian(&joints).determinant().abs() > 1e-3);
         let goal = forward(&joints).arm_from_connection;
         let seed: JointAngles = std::array::from_fn(|i| f64::clamp(joints[i] + nudge[i], -TAU, TAU));
@@ -260,7 +260,7 @@ fn near_the_wrist_singularity_solutions_stay_exact() {
         let goal = forward(&joints).arm_from_connection;
         let found = inverse_nearest(&goal, &joints, &turns()).unwrap();
         assert!(miss(&found, &goal) < EXACT, "joint 5 at 1e-{exponent}");
-        // The nearer the singularity the less the pose says about joint 6, but it must not jump away.
+        // The closer the singularity the less the pose determines joint 6, but it must not jump away.
         assert!((found[5] - joints[5]).abs() < 1e-2, "joint 5 at 1e-{exponent}: {found:?}");
     }
 }
@@ -330,7 +330,7 @@ fn a_joint_range_of_its_own_is_filled_by_a_full_turn() {
     assert!((found[5] - (TAU - 0.7)).abs() < 1e-9, "{found:?}");
 }
 
-/// One pass of the simulation moves the goal by little; the arm must keep up with it in a few iterations.
+/// One pass of the simulation moves the goal by little; the arm must follow it in a few iterations.
 #[test]
 fn damped_least_squares_converges_at_once_when_the_goal_is_near() {
     let seed = [0.0_f64, 45.0, -60.0, 0.0, 90.0, 0.0].map(f64::to_radians);

@@ -1,4 +1,4 @@
-//! A value for each joint of an arm, of whatever number of joints.
+//! A value for each joint of an arm, for any number of joints.
 
 use std::fmt;
 use std::ops::{Deref, DerefMut};
@@ -7,8 +7,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::{ArmError, MAX_JOINTS};
 
-/// A number for each joint from the base to the tip: a position in radians, or of a prismatic joint in metres. It is as
-/// cheap to copy as an array, and has as many numbers as the arm has joints, 0 to [`MAX_JOINTS`].
+/// A number for each joint from the base to the tip: a position in radians, or in metres for a prismatic joint. It is
+/// as cheap to copy as an array, and has as many numbers as the arm has joints, 0 to [`MAX_JOINTS`].
 #[derive(Clone, Copy)]
 pub struct JointValues {
     count: usize,
@@ -17,13 +17,13 @@ pub struct JointValues {
 }
 
 impl JointValues {
-    /// From the value of each joint, counted from 0. Of more than [`MAX_JOINTS`] joints, the first so many.
+    /// The values by a function of the joint, counted from 0. For more than [`MAX_JOINTS`] joints, only the first ones.
     pub fn from_fn(count: usize, mut value: impl FnMut(usize) -> f64) -> Self {
         let count = count.min(MAX_JOINTS);
         Self { count, values: std::array::from_fn(|i| if i < count { value(i) } else { 0.0 }) }
     }
 
-    /// These, where a constant is needed.
+    /// The given values, where a constant is needed.
     pub const fn of<const N: usize>(given: [f64; N]) -> Self {
         const { assert!(N <= MAX_JOINTS, "no arm has so many joints") };
         let mut values = [0.0; MAX_JOINTS];
@@ -40,7 +40,7 @@ impl JointValues {
         Self::from_fn(count, |_| 0.0)
     }
 
-    /// Another number for each joint.
+    /// The result of a function of each value.
     #[must_use]
     pub fn map(self, mut change: impl FnMut(f64) -> f64) -> Self {
         Self::from_fn(self.count, |i| change(self.values[i]))

@@ -6,9 +6,9 @@ use handeye_geometry::depth::{DepthImage, DepthSample};
 
 /// The mean of images of one size.
 ///
-/// Colours are the mean of each channel, rounded to the nearest level (halves up). A depth is the mean of those that
-/// are one; a pixel that never had one stays what the sensor says for no measurement, and is far away when it was far
-/// away at least once.
+/// Colours are the mean of each channel, rounded to the nearest level (halves up). A depth is the mean of the valid
+/// ones; a pixel that never had one keeps the sensor's value for no measurement, and is far away when it was far away
+/// at least once.
 #[derive(Debug, Clone)]
 pub struct Average {
     frames: u32,
@@ -23,7 +23,7 @@ pub struct Average {
 struct DepthSum {
     metres: f64,
     count: u32,
-    /// What stands for no measurement, and whether it is the far plane.
+    /// The value for no measurement, and whether it is the far plane.
     hole: f32,
     hole_is_far: bool,
 }
@@ -77,7 +77,7 @@ impl Average {
     pub(crate) fn finish(&self) -> (RgbImage, Option<DepthImage>) {
         let frames = self.frames.max(1);
         let levels = self.colours.iter().map(|sum| (sum.saturating_add(frames / 2) / frames) as u8).collect();
-        // The length is that of an image of this size; an empty image stands for none.
+        // The length is that of an image of this size; otherwise the image is empty.
         let rgb = RgbImage::from_raw(self.size.0, self.size.1, levels).unwrap_or_default();
         let mean = |sum: &DepthSum| {
             if sum.count > 0 { (sum.metres / f64::from(sum.count)) as f32 } else { sum.hole }

@@ -2,8 +2,8 @@
 
 use image::GrayImage;
 
-/// About so many cells along a row: few enough to be quick, small enough that an edge that moves by a tenth of a pixel
-/// changes its cells by more than the noise of their mean.
+/// About this many cells along a row: few enough to be quick, small enough that an edge that moves by a tenth of a
+/// pixel changes its cells by more than the noise of their mean.
 const COLUMNS: u32 = 80;
 
 /// Brightness may change by this factor from one image to another, as lamps and exposure make it; more is a change.
@@ -17,7 +17,7 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    /// Cells that the border cuts count with what is left of them.
+    /// Cells at the border count with their part inside of the image.
     pub fn of(grey: &GrayImage) -> Self {
         let (width, height) = grey.dimensions();
         let side = width.div_ceil(COLUMNS).max(1);
@@ -38,12 +38,12 @@ impl Cells {
         Self { size: (width, height), means: sums.iter().enumerate().map(mean).collect() }
     }
 
-    /// How many there are.
+    /// Number of cells.
     pub fn count(&self) -> usize {
         self.means.len()
     }
 
-    /// Whether both are of images of one size.
+    /// Whether both are of images of the same size.
     pub fn fits(&self, other: &Self) -> bool {
         self.size == other.size
     }

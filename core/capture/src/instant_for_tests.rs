@@ -1,4 +1,4 @@
-//! One instant with images of its own.
+//! One instant with its own images.
 
 use image::{GrayImage, Rgb, RgbImage};
 
@@ -6,7 +6,7 @@ use crate::Shot;
 use handeye_geometry::depth::DepthImage;
 use handeye_geometry::frames::{Base, Pose, Tip};
 
-/// One instant with images of its own.
+/// One instant with its own images.
 #[derive(Debug, Clone)]
 pub struct Instant {
     pub number: u64,

@@ -5,7 +5,7 @@
 //! | --- | --- |
 //! | [`Watch`] | whether robot and image are at rest |
 //! | [`Average`] | the mean of images and depths |
-//! | [`Scatter`] | how much corners differ from image to image |
+//! | [`Scatter`] | scatter of corners from image to image |
 //! | [`nearest_similar`] | whether there is a capture from almost the same pose |
 //! | [`Machine`] | what comes next, from the request to the average |
 //!
@@ -52,11 +52,11 @@ pub struct Shot<'a> {
     pub number: u64,
     /// Simulated time \[s\].
     pub sim_time_s: f64,
-    /// When it arrived, on the clock of whoever asks \[s\].
+    /// When it arrived, on the caller's clock \[s\].
     pub received_s: f64,
     /// The tip as the controller reports it.
     pub base_from_tip: Pose<Base, Tip>,
-    /// Positions of the joints \[rad\]; none where the robot does not report them.
+    /// Positions of the joints \[rad\]; empty where the robot does not report them.
     pub joints_rad: &'a [f64],
     /// Colour.
     pub rgb: &'a RgbImage,
@@ -64,7 +64,7 @@ pub struct Shot<'a> {
     pub grey: &'a GrayImage,
     /// Depth, from a camera that measures it.
     pub depth: Option<&'a DepthImage>,
-    /// The depth sensor's far plane \[m\]: depths there are no surface.
+    /// The depth sensor's far plane \[m\]: depths there are not a surface.
     pub far_plane_m: f32,
 }
 

@@ -9,15 +9,15 @@ use handeye_geometry::depth::DepthImage;
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_geometry::targets::observation::Corner;
 
-/// So long \[s\], on the clock of whoever asks, images may stay away and simulated time may stand still: a slow camera, or one
-/// late image of a computer under load, is waited for.
+/// Longest time \[s\], on the caller's clock, without images or progress of simulated time: a slow camera, or one late image
+/// of a computer under load, is waited for.
 pub const NO_IMAGES_S: f64 = 5.0;
 
 /// Images that must have come before robot or image are reported not to come to rest: twice as many as show that they
 /// are. A simulation that runs as fast as it can may pass the limit of time between two.
 const FAIR_IMAGES: u32 = 8;
 
-/// What is asked for.
+/// A request for a capture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// Images to average; 0 counts as 1.
@@ -45,7 +45,7 @@ pub enum Wait {
     Averaging {
         /// So many are there.
         done: u32,
-        /// Of so many.
+        /// Number requested.
         of: u32,
     },
 }
@@ -55,17 +55,17 @@ pub enum Wait {
 pub enum Refusal {
     /// The robot did not come to rest.
     RobotMoves {
-        /// How long was waited \[s\], simulated.
+        /// Simulated time waited \[s\].
         after_s: f64,
-        /// How fast it still moves.
+        /// Speed of the robot.
         rate: RobotRate,
     },
     /// The robot is at rest and the image is not.
     ImageChanges {
-        /// How long was waited \[s\], simulated.
+        /// Simulated time waited \[s\].
         after_s: f64,
     },
-    /// Simulated time stands still.
+    /// Simulated time does not advance.
     Paused,
     /// No images come.
     NoImages,
@@ -73,7 +73,7 @@ pub enum Refusal {
     TooSimilar(Similar),
 }
 
-/// What comes next.
+/// The next step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Progress {
     /// More images.
@@ -99,7 +99,7 @@ pub struct Taken {
     pub corner_noise_px: Option<f64>,
 }
 
-/// Takes in images one by one, from the request on, and says what comes next.
+/// Takes in images one by one, from the request on, and returns the next step.
 ///
 /// 1. Images that arrived before the request do not count.
 /// 2. [`Watch`] must find joints and image still over four images that do.
@@ -107,7 +107,7 @@ pub struct Taken {
 ///    image has changed since, all of them are dropped and it goes back to waiting.
 ///
 /// An image may show the pass before the joints of its instant were read; as nothing moved over three intervals, it
-/// shows the arm where the joints say.
+/// shows the arm where its joints are.
 #[derive(Debug)]
 pub struct Machine {
     plan: Plan,
@@ -158,8 +158,8 @@ impl Machine {
         }
         self.arrived_s = shot.received_s;
         let passed_s = self.sim_time_s.map(|before_s| shot.sim_time_s - before_s);
-        // A simulation that was started again counts from its own beginning. Images of an instant that was seen, or of
-        // none, say nothing.
+        // A simulation that was started again counts from its own beginning. Images of an instant that was seen
+        // already, or without a valid time, are ignored.
         if passed_s == Some(0.0) || !shot.sim_time_s.is_finite() {
             return self.progress();
         }
@@ -171,7 +171,7 @@ impl Machine {
         self.progress()
     }
 
-    /// Adds an image to the average. `false` when there is none yet or now.
+    /// Adds an image to the average. `false` when there is none yet, or no longer.
     fn collect(&mut self, shot: &Shot<'_>) -> bool {
         let Some(collected) = &mut self.collected else { return false };
         let since_s = shot.sim_time_s - collected.reference_s;
@@ -183,7 +183,7 @@ impl Machine {
             collected.newest = shot.number;
             self.wait = Wait::Averaging { done: collected.average.frames(), of: self.frames() };
         } else {
-            // What moved and stands again has to be looked at from the beginning.
+            // What moved and is at rest again has to be checked from the beginning.
             self.collected = None;
             self.watch = Watch::default();
             self.waits_for(rest);
@@ -217,13 +217,13 @@ impl Machine {
             self.ended = match rest {
                 Rest::RobotMoves(rate) => Some(Refusal::RobotMoves { after_s, rate }),
                 Rest::ImageChanges => Some(Refusal::ImageChanges { after_s }),
-                // Nothing moved last; an image or two more tell.
+                // Nothing moved last; one or two more images decide.
                 Rest::Unknown | Rest::Still { .. } => None,
             };
         }
     }
 
-    /// What moved last is waited for until everything is known to be still.
+    /// What moved last is waited for until everything is known to be at rest.
     fn waits_for(&mut self, rest: Rest) {
         match rest {
             Rest::RobotMoves(_) => self.wait = Wait::RobotMoves,
@@ -233,7 +233,7 @@ impl Machine {
     }
 
     /// Takes in that time has passed: `now_s` on the clock that images arrive by. `camera_heard_s` is when the camera
-    /// last answered in any way, which tells a simulation that rests from a camera that is gone.
+    /// last answered in any way, which distinguishes a paused simulation from a camera that is gone.
     pub fn pass_time(&mut self, now_s: f64, camera_heard_s: Option<f64>) -> Progress {
         if self.ended.is_none() && !self.is_complete() && now_s - self.advanced_s > NO_IMAGES_S {
             let heard_s = camera_heard_s.map_or(self.arrived_s, |heard_s| heard_s.max(self.arrived_s));
@@ -250,7 +250,7 @@ impl Machine {
         }
     }
 
-    /// What comes next.
+    /// The next step.
     pub fn progress(&self) -> Progress {
         match self.ended {
             Some(refusal) => Progress::Refused(refusal),

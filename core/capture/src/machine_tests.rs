@@ -6,7 +6,7 @@ use handeye_geometry::frames::Pose;
 use handeye_geometry::targets::observation::Corner;
 use handeye_simulate::flat_board::{Board, image};
 
-/// When the capture is asked for; image 0 arrives at 100 s and one every 0.05 s after.
+/// When the capture is requested; image 0 arrives at 100 s and one every 0.05 s after.
 const REQUESTED_S: f64 = 100.0;
 const JOINTS: [f64; 6] = [0.1, 0.5, -1.0, 0.0, 1.5, -3.1];
 
@@ -87,7 +87,7 @@ fn nothing_is_captured_while_a_joint_moves() {
     };
     assert!((3.0..3.1).contains(after_s) && (rate_rad_s - 1.1e-3).abs() < 1e-9, "{refused:?}");
     assert_eq!(refused[1], Progress::Waits(Wait::RobotMoves));
-    // The joint turns through half a turn on its way, which is no jump.
+    // The joint turns through half a turn on its way, which is not a jump.
     let settles = feed(&at(0.2, 20));
     assert_eq!(settles.last(), Some(&Progress::Complete));
     assert_eq!(settles.len(), 24, "image 20 is where it stands, and three more");
@@ -103,7 +103,7 @@ fn a_joint_that_is_no_number_never_rests() {
 
 #[test]
 fn an_image_that_comes_late_is_waited_for() {
-    // The joints stand, the image follows: it drifts, then jumps once more, then rests from image 12 on.
+    // The joints are at rest, the image follows: it drifts, then jumps once more, then rests from image 12 on.
     for noise in [0.0, 2.0] {
         let drift = |number: u64| if number < 12 { 0.1 * number as f64 } else { 2.0 };
         let mut machine = Machine::new(plan(1), REQUESTED_S);

@@ -1,4 +1,4 @@
-//! How much corners differ from image to image.
+//! Scatter of corners from image to image.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ pub struct Scatter {
 }
 
 impl Scatter {
-    /// Images below which a scatter says nothing.
+    /// Number of images below which a scatter is not meaningful.
     pub const LEAST_IMAGES: u32 = 3;
 
     /// Adds the corners of an image.
@@ -36,9 +36,9 @@ impl Scatter {
     /// `σ² = Σ (u − ū)² / Σ (n − 1)`
     ///
     /// with the sums over all corners and both axes, the mean of each corner and axis of its own, and `n` the images
-    /// that the corner was found in. The variance is unbiased; its relative error is about √(2 / Σ (n − 1)). It is what
-    /// differs from image to image (noise, vibration) and not what is wrong with all of them alike. `None` with
-    /// fewer than three images.
+    /// that the corner was found in. The variance is unbiased; its relative error is about √(2 / Σ (n − 1)). It covers
+    /// differences from image to image (noise, vibration), not errors that are common to all of them. `None` with fewer
+    /// than three images.
     pub fn sigma_px(&self) -> Option<f64> {
         let freedom: u32 = self.corners.values().map(|(count, ..)| 2 * (count - 1)).sum();
         let squares: f64 = self.corners.values().map(|(.., squares)| squares.sum()).sum();

@@ -7,14 +7,14 @@ use handeye_geometry::frames::{Base, Pose, Tip};
 pub struct Similar {
     /// Its number.
     pub id: u32,
-    /// How far away \[m\].
+    /// Distance \[m\].
     pub distance_m: f64,
-    /// How much turned \[rad\].
+    /// Rotation \[rad\].
     pub angle_rad: f64,
 }
 
 /// Of the captures closer than *both* limits, the closest relative to them. A capture nearby that looks from another
-/// angle adds something, and so does one with the same orientation from elsewhere; a limit of zero refuses nothing.
+/// angle adds information, and so does one with the same orientation from elsewhere; a limit of zero refuses nothing.
 pub fn nearest_similar(
     base_from_tip: &Pose<Base, Tip>,
     others: &[(u32, Pose<Base, Tip>)],

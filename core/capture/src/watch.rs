@@ -1,4 +1,4 @@
-//! Whether the robot stands still and the image has stopped changing.
+//! Whether the robot is at rest and the image has stopped changing.
 
 use std::collections::VecDeque;
 
@@ -35,14 +35,14 @@ const SPREAD_OF_ABSOLUTE: f64 = 0.756;
 /// Standard deviations of the mean difference that chance is given.
 const CHANCE: f64 = 5.0;
 
-/// Difference \[grey levels\] that is none: one level in half a percent of the cells, which is how an image rounds that
-/// moves by a hundredth of a pixel.
+/// Difference \[grey levels\] that counts as zero: one level in half a percent of the cells, which is how an image
+/// rounds that moves by a hundredth of a pixel.
 const NO_DIFFERENCE: f64 = 0.005;
 
-/// How things are after an image.
+/// State after an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Rest {
-    /// Too few images to tell, and nothing moved in those.
+    /// Too few images to decide, and nothing moved in those.
     Unknown,
     /// The robot has not come to rest, and how fast it moves.
     RobotMoves(RobotRate),
@@ -55,7 +55,7 @@ pub enum Rest {
     },
 }
 
-/// How fast a robot moves.
+/// Speed of a robot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum RobotRate {
     /// The fastest joint [rad/s].
@@ -83,7 +83,8 @@ pub enum RobotRate {
 /// more than chance allows. No level of noise has to be known.
 ///
 /// A motion of the whole image by a tenth of a pixel between the first and the last of the four is seen at 2 grey
-/// levels of noise. Light that flickers all over the image is no change; light that flickers in stripes is one.
+/// levels of noise. Light that flickers all over the image does not count as a change; light that flickers in stripes
+/// is one.
 #[derive(Debug, Clone, Default)]
 pub struct Watch {
     seen: VecDeque<Sample>,
@@ -158,7 +159,7 @@ struct Configuration {
     base_from_tip: Pose<Base, Tip>,
 }
 
-/// How far a robot has moved.
+/// Motion of a robot.
 #[derive(Debug, Clone, Copy)]
 enum Travel {
     /// The joint that turned furthest \[rad\].
@@ -182,7 +183,7 @@ impl Configuration {
 }
 
 impl Travel {
-    /// Whether a robot that moved so far in an interval is at rest; not for what is no number.
+    /// Whether a robot that moved by this in an interval is at rest; false for NaN.
     fn is_rest(self, interval_s: f64) -> bool {
         let limit = STILL_RATE_RAD_S * interval_s.min(LONGEST_INTERVAL_S);
         match self {
@@ -199,7 +200,7 @@ impl Travel {
     }
 }
 
-/// Largest turn of a joint \[rad\], by the shorter way round; not a number when a joint is none.
+/// Largest turn of a joint \[rad\], by the shorter way round; NaN when a joint value is not finite.
 fn travel_rad(from: &[f64], to: &[f64]) -> f64 {
     use std::f64::consts::{PI, TAU};
     if from.len() != to.len() {
@@ -209,7 +210,7 @@ fn travel_rad(from: &[f64], to: &[f64]) -> f64 {
     from.iter().zip(to).map(turn).fold(0.0, |most, turn| if turn > most || turn.is_nan() { turn } else { most })
 }
 
-/// What images of an average are held against: robot and image as they were when everything was at rest.
+/// Reference for the images of an average: robot and image as they were when everything was at rest.
 #[derive(Debug, Clone)]
 pub(super) struct Reference {
     robot: Configuration,
@@ -218,12 +219,12 @@ pub(super) struct Reference {
 }
 
 impl Reference {
-    /// Of the image after which [`Watch`] found everything still, with the noise it found.
+    /// From the image after which [`Watch`] found everything at rest, with the noise it found.
     pub fn new(shot: &Shot<'_>, noise: f64) -> Self {
         Self { robot: Configuration::of(shot), cells: Cells::of(shot.grey), noise }
     }
 
-    /// How a later image differs from it. The robot may have moved by as much as in one interval at rest, however
+    /// The difference of a later image from it. The robot may have moved by as much as in one interval at rest, however
     /// long ago it was.
     pub fn compare(&self, shot: &Shot<'_>, interval_s: f64) -> Rest {
         let travel = Configuration::of(shot).travel_from(&self.robot);

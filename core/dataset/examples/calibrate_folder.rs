@@ -10,8 +10,8 @@
 //! `corners` under `[target]` with a row `image,column,row,u,v` for each corner that a detector found, pixel (0, 0) being
 //! the centre of the top-left pixel. `docs/reference/dataset.md` has all of it.
 //!
-//! What it prints is where the camera is: on the tip for an eye-in-hand set, in the base for an eye-to-hand set; and how
-//! far off a point that is measured with it is expected to be.
+//! What it prints is where the camera is: on the tip for an eye-in-hand set, in the base for an eye-to-hand set; and the
+//! expected error of a point that is measured with it.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -26,7 +26,7 @@ use handeye_geometry::progress::CancelToken;
 fn main() -> Result<(), Box<dyn Error>> {
     let folder: PathBuf = std::env::args_os().nth(1).ok_or("usage: calibrate_folder FOLDER")?.into();
     let dataset = Dataset::read(&folder)?;
-    // Corners that no table has would be looked for in the images here.
+    // Corners that are not in a table would be detected in the images here.
     let observations = dataset.observations(|_| None);
     let calibration = calibrate(&observations, Method::Joint, &CancelToken::default())?;
     let hand_eye = calibration.hand_eye.ok_or("the folder has no robot poses")?;

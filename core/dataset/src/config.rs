@@ -33,7 +33,7 @@ struct RawRobot {
     poses: String,
     length_unit: LengthUnit,
     rotation: RawRotation,
-    /// Needed for the conventions with angles; elsewhere it may stand and says nothing.
+    /// Needed for the conventions with angles; elsewhere it is allowed and ignored.
     angle_unit: Option<AngleUnit>,
     pose: PoseDirection,
     joints: Option<Spanned<i64>>,
@@ -55,13 +55,13 @@ pub(super) struct RobotConfig {
     pub pose: PoseDirection,
     /// Columns of joint angles after those of the rotation, if there are any.
     pub joints: Option<JointColumns>,
-    /// Where the tip of the tool is in the frame of the tip, metres.
+    /// Position of the tool's tip in the frame of the tip, metres.
     pub tool_m: Option<[f64; 3]>,
-    /// How accurate it is, millimetres.
+    /// Accuracy of the robot, millimetres.
     pub accuracy_mm: Option<f64>,
 }
 
-/// How a row of a pose table writes its rotation.
+/// Rotation convention of a pose table's rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum RotationConvention {
     QuaternionXyzw,
@@ -132,11 +132,11 @@ impl ModelName {
     }
 }
 
-/// What `dataset.toml` says, checked.
+/// Contents of `dataset.toml`, checked.
 #[derive(Debug, Clone)]
 pub(super) struct Config {
     pub mode: Option<Mode>,
-    /// Without a robot, the images that count; `None`: all of the folder.
+    /// Without a robot, the images to use; `None`: all of the folder.
     pub images: Option<Vec<String>>,
     pub target: TargetSpec,
     pub corners: Option<String>,
@@ -146,7 +146,7 @@ pub(super) struct Config {
     pub camera: Option<CameraConfig>,
 }
 
-/// The table `[camera]`, before the images have told their size.
+/// The table `[camera]`, before the size of the images is known.
 #[derive(Debug, Clone)]
 pub(super) struct CameraConfig {
     pub fixed: bool,

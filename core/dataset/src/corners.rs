@@ -10,8 +10,8 @@ use super::text::{Table, TextFile};
 use handeye_geometry::targets::TargetSpec;
 use handeye_geometry::targets::observation::Corner;
 
-/// How far beside the image a corner may be, in pixels: room for a pixel origin at the corner of the pixel and for a
-/// refinement that slid over the border.
+/// How far outside of the image a corner may be, in pixels: room for a pixel origin at the corner of the pixel and for
+/// a refinement that slid over the border.
 const BORDER_PX: f64 = 1.0;
 
 /// All corners of one image.

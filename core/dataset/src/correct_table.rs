@@ -12,14 +12,14 @@ use super::poses::unit_quaternion;
 use super::text::{Table, TextFile};
 use handeye_geometry::frames::{Base, Pose, Tip};
 
-/// Where a tip shall be.
+/// Desired pose of a tip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WantedPose {
     /// Line in the table.
     pub line: usize,
-    /// Where, in the base.
+    /// Desired pose in the base frame.
     pub base_from_tip: Pose<Base, Tip>,
-    /// Joint values near which the arm shall be, radians; `None` where the table does not say.
+    /// Joint values near which the arm should be, radians; `None` where the table does not state them.
     pub near_rad: Option<Vec<f64>>,
 }
 
@@ -32,7 +32,7 @@ impl CorrectTable {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`DatasetError`] where it is none, or no text.
+    /// [`DatasetError`] where it is not such a table, or not text.
     pub fn open(path: &Path) -> Result<Self, DatasetError> {
         let unnamed = || DatasetError::new(path, None, DatasetProblem::Unreadable("it is not a file".into()));
         let name = path.file_name().ok_or_else(unnamed)?;
@@ -42,7 +42,7 @@ impl CorrectTable {
     /// Reads what another program writes, to its end; `name` is what messages call it.
     ///
     /// # Errors
-    /// [`DatasetError`] where it cannot be read, or is no text.
+    /// [`DatasetError`] where it cannot be read, or is not text.
     pub fn of_reader(name: &Path, reader: impl Read) -> Result<Self, DatasetError> {
         TextFile::of_reader(name, reader).map(Self)
     }

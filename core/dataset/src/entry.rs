@@ -18,8 +18,8 @@ pub struct Entry {
     pub base_from_tip: Option<Pose<Base, Tip>>,
     /// Joint angles as the controller reported them, radians; `None` when the pose table has none.
     pub joints_rad: Option<Vec<f64>>,
-    /// Where the joints are at the tip, see [`handeye_arm::Arm::tip_from_joints`]; empty without joint angles, without
-    /// the arm, or where the two do not fit the poses, see [`Dataset::arm`](super::Dataset::arm).
+    /// Poses of the joints relative to the tip, see [`handeye_arm::Arm::tip_from_joints`]; empty without joint angles,
+    /// without the arm, or where the two do not fit the poses, see [`Dataset::arm`](super::Dataset::arm).
     pub tip_from_joints: Vec<Isometry3<f64>>,
     /// Corners detected elsewhere, sorted by index, empty when the target was not found in this image; `None` when
     /// the data set has no corner table.

@@ -1,4 +1,4 @@
-//! What can be wrong with a dataset folder.
+//! Errors of a dataset folder.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use handeye_images::ImageFileError;
 use handeye_wording::Text;
 use handeye_wording::text;
 
-/// What is wrong, in which file, and in which of its rows. One line of text: `FILE, row N: what, and what to do`.
+/// An error, with its file and row. One line of text: `FILE, row N: what, and what to do`.
 ///
 /// The file could not be used as input: a command line ends with code 2.
 #[derive(Debug, thiserror::Error, handeye_wording::Localized)]
@@ -20,7 +20,7 @@ pub struct DatasetError {
     pub file: PathBuf,
     /// Line as an editor counts it, from 1; `None` when the file as a whole is meant.
     pub row: Option<usize>,
-    /// What is wrong there.
+    /// The error in that place.
     pub problem: DatasetProblem,
 }
 
@@ -44,7 +44,7 @@ fn place(file: &Path, row: Option<usize>) -> Text {
 #[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum DatasetProblem {
-    /// The file system says no.
+    /// The file system refuses.
     #[error("cannot be read: {0}")]
     Unreadable(String),
     /// The folder has no description.
@@ -60,7 +60,7 @@ pub enum DatasetProblem {
     FileTooLarge {
         /// Its size.
         bytes: u64,
-        /// What is read.
+        /// The limit.
         limit: u64,
     },
     /// Not a letter of text.
@@ -69,7 +69,7 @@ pub enum DatasetProblem {
     /// A header and nothing below it.
     #[error("has a header and no rows: {0}")]
     NoRows(&'static str),
-    /// Neither images nor anything that stands in for them.
+    /// Neither images nor a table that replaces them.
     #[error("has no images (png, jpg, bmp or tif), nor has its images folder{0}")]
     NoImages(&'static str),
     /// Not TOML, an unknown key, or a word that is not one of the choices.
@@ -90,9 +90,9 @@ pub enum DatasetProblem {
     BadValue {
         /// The key in `dataset.toml`.
         key: &'static str,
-        /// What it says.
+        /// The value found.
         value: String,
-        /// What it may be.
+        /// The valid values.
         want: &'static str,
     },
     /// Two keys that exclude each other.
@@ -101,12 +101,12 @@ pub enum DatasetProblem {
     /// Joint angles for another arm.
     #[error("joints = {got}, but the arm of [robot.arm] has {need}")]
     JointCount {
-        /// What `joints` says.
+        /// The number in `joints`.
         got: usize,
         /// Joints of the arm.
         need: usize,
     },
-    /// An arm that is none.
+    /// An invalid arm.
     #[error("[robot.arm]: {0}")]
     Arm(ArmError),
     /// Or a URDF without one.
@@ -168,7 +168,7 @@ pub enum DatasetProblem {
     NotANumber {
         /// Header of the column.
         column: &'static str,
-        /// What the cell says, shortened.
+        /// Contents of the cell, shortened.
         cell: String,
     },
     /// NaN or infinite.
@@ -176,21 +176,21 @@ pub enum DatasetProblem {
     NotFinite {
         /// Header of the column.
         column: &'static str,
-        /// What the cell says, shortened.
+        /// Contents of the cell, shortened.
         cell: String,
     },
-    /// A quaternion that is none.
+    /// A quaternion that is not a unit quaternion.
     #[error("the quaternion has length {length:.6}, which is more than {tolerance} from 1: check the columns")]
     NotUnit {
         /// Length of the quaternion as it was read.
         length: f64,
-        /// How far from 1 it may be.
+        /// Largest deviation from 1.
         tolerance: f64,
     },
     /// A 3×3 matrix that does not rotate.
     #[error("r11…r33 is not a rotation matrix: {0}")]
     NotARotation(NotARotation),
-    /// An angle that nobody writes in radians, or a typing error.
+    /// An angle too large to be in radians, or a typing error.
     #[error("{column} = {value} {unit} is more than two turns: check {key}")]
     AngleTooLarge {
         /// Header of the column.
@@ -205,9 +205,9 @@ pub enum DatasetProblem {
     /// The same image, or the same point of it, twice.
     #[error("{what} is already in row {first_row}: remove one of the two")]
     Duplicate {
-        /// What is there twice.
+        /// The duplicate.
         what: String,
-        /// Where it was first.
+        /// Row of its first occurrence.
         first_row: usize,
     },
     /// An image name that cannot be one.
@@ -241,9 +241,9 @@ pub enum DatasetProblem {
         name: String,
         /// Its size.
         got: (u32, u32),
-        /// What it should be.
+        /// The expected size.
         need: (u32, u32),
-        /// Who says so.
+        /// Where that size is from.
         others: &'static str,
     },
     /// A row about an image that the pose table does not have.
@@ -266,7 +266,7 @@ pub enum DatasetProblem {
         /// Rows of the target.
         rows: usize,
     },
-    /// A corner beside the image it is stated to be in.
+    /// A corner outside of the image it is stated to be in.
     #[error("({u_px}, {v_px}) is outside of the image of {of} px", of = self::size(*size))]
     OutsideImage {
         /// Column in pixels.
@@ -282,7 +282,7 @@ fn size((width, height): (u32, u32)) -> String {
     format!("{width}×{height}")
 }
 
-/// What a cell says, short enough for a message.
+/// Contents of a cell, short enough for a message.
 pub(super) fn shown(cell: &str) -> String {
     const LONGEST: usize = 40;
     if cell.chars().count() <= LONGEST {

@@ -10,14 +10,14 @@ use handeye_wording::one_line;
 
 /// Endings of the formats that are read, in lower case.
 const ENDINGS: [&str; 6] = ["png", "jpg", "jpeg", "bmp", "tif", "tiff"];
-/// Where sessions keep their images.
+/// Folder in which sessions keep their images.
 const SUBFOLDER: &str = "images";
 
-/// Entries of a folder that are looked at to say whether it holds images.
+/// Entries of a folder that are checked to determine whether it holds images.
 const LOOKED_AT: usize = 1000;
 
-/// Whether there is an image in a folder or in its folder `images`, by the ending of its name. Of a folder that cannot be read, or
-/// of an image behind more than a thousand other files, it says that there is none.
+/// Whether there is an image in a folder or in its folder `images`, by the ending of its name. For a folder that cannot be read,
+/// or an image after more than a thousand other files, it returns false.
 pub fn holds_images(folder: &Path) -> bool {
     let holds = |folder: &Path| {
         std::fs::read_dir(folder).is_ok_and(|entries| entries.take(LOOKED_AT).flatten().any(|it| is_image(&it.path())))
@@ -30,7 +30,7 @@ fn is_image(path: &Path) -> bool {
     !is_hidden && path.extension().is_some_and(|it| ENDINGS.iter().any(|ending| it.eq_ignore_ascii_case(ending)))
 }
 
-/// The images in a folder and in its folder `images`, in natural order; hidden files are none.
+/// The images in a folder and in its folder `images`, in natural order; hidden files are left out.
 pub(super) fn list(folder: &Path) -> Result<Vec<PathBuf>, DatasetError> {
     let mut paths = list_one(folder, Path::new(""))?;
     if folder.join(SUBFOLDER).is_dir() {

@@ -28,7 +28,7 @@ pub(super) struct RawArm {
     /// Links of that file.
     base: Option<String>,
     tip: Option<String>,
-    /// As a session's own data set has it.
+    /// The chain in a session's own data set.
     chain: Option<Box<Arm>>,
 }
 
@@ -63,16 +63,16 @@ impl NamedArm {
     }
 }
 
-/// What `[robot]` says of joint angles.
+/// Joint angles according to `[robot]`.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct JointColumns {
-    /// How many columns there are.
+    /// Number of columns.
     pub count: usize,
     pub unit: AngleUnit,
     pub arm: Option<NamedArm>,
 }
 
-/// Checks what `[robot]` says of joint angles; `None` when it says nothing.
+/// Checks the joint angles in `[robot]`; `None` when it has none.
 pub(super) fn joint_columns(
     joints: Option<&Spanned<i64>>,
     unit: Option<AngleUnit>,
@@ -127,13 +127,13 @@ fn counted(model: ArmModel, joints: usize, span: &Range<usize>) -> Result<ArmMod
     if joints == need { Ok(model) } else { Err(at(DatasetProblem::JointCount { got: joints, need })) }
 }
 
-/// The arm of a data set, and how well joint angles and reported poses fit together with it.
+/// The arm of a data set, and how well joint angles and reported poses agree with it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DatasetArm {
     /// The arm as `[robot.arm]` names it.
     pub model: ArmModel,
-    /// Where it stands and how far each view, in the order of the entries, is from it; why the joint angles are not
-    /// used otherwise. Then every [`Entry::tip_from_joints`] is empty.
+    /// Place of the arm and deviation of each view, in the order of the entries; otherwise why the joint angles are not
+    /// used. Then every [`Entry::tip_from_joints`] is empty.
     pub placement: Result<Placement, PlacementError>,
 }
 

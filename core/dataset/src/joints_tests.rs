@@ -20,7 +20,7 @@ fn radians(deg: &[f64; 6]) -> [f64; 6] {
     deg.map(f64::to_radians)
 }
 
-/// Where a UR5 on a table with a tool has its tip.
+/// Pose of the tip of a UR5 on a table with a tool.
 fn tip(joints_rad: &[f64; 6]) -> Pose<Base, Tip> {
     let arm = ArmModel::Kind(ArmKind::Ur5Coppeliasim).arm().expect("built in");
     let foot = nalgebra::Isometry3::translation(0.1, 0.2, 0.8) * arm.base_from_first;
@@ -110,7 +110,7 @@ fn the_rows_of_an_arm_do_as_well_as_its_name() {
     }
 }
 
-/// The same arm as a URDF without a tool, and with a gripper beside its tip.
+/// The same arm as a URDF without a tool, and with a gripper next to its tip.
 fn urdf() -> String {
     let arm = ArmModel::Kind(ArmKind::Ur5Coppeliasim).arm().expect("built in");
     let mut text = "<robot name=\"ur5\"><link name=\"l0\"/>".to_owned();
@@ -227,7 +227,7 @@ fn joint_angles_that_do_not_belong_to_the_poses_are_not_used_and_the_data_set_sa
 
 #[test]
 fn a_defect_of_the_joint_angles_is_named_with_its_row() {
-    /// Lines of `[robot]`, columns of joints, their angles, and what the message must say.
+    /// Lines of `[robot]`, columns of joints, their angles, and what the message must contain.
     type Case = (&'static str, &'static str, [[f64; 6]; 5], &'static [&'static str]);
     let mut huge = JOINTS_DEG;
     huge[2][4] = 721.0;

@@ -1,4 +1,4 @@
-//! Dataset folders: images, robot poses and `dataset.toml`, which says in which conventions they are.
+//! Dataset folders: images, robot poses and `dataset.toml`, which states their conventions.
 //!
 //! Nothing is guessed and nothing is dropped: a convention that is not stated, a word that is not one of the choices,
 //! a row without its image is a [`DatasetError`] that names the file and the row.
@@ -13,8 +13,8 @@
 //! | `rpy` | `roll,pitch,yaw` (or `rx,ry,rz`): URDF, R = Rz(yaw)·Ry(pitch)·Rx(roll) |
 //! | `matrix` | `r11,r12,r13,r21,…,r33`, row by row |
 //!
-//! Joint angles follow in columns `q1,q2,…` where `[robot]` says how many there are. With the arm they belong to they tell
-//! how the tip moves with each joint, see [`DatasetArm`].
+//! Joint angles follow in columns `q1,q2,…` where `[robot]` states how many there are. With their arm they determine how
+//! the tip moves with each joint, see [`DatasetArm`].
 //!
 //! A quaternion may be 10⁻³ off unit length, a matrix 2·10⁻³ off orthonormal; both are then made exact.
 //!
@@ -90,11 +90,11 @@ use text::TextFile;
 pub struct Dataset {
     /// The folder that was read.
     pub folder: PathBuf,
-    /// Where the camera sits; `None` when there is no robot, so that only intrinsics can be estimated.
+    /// Where the camera is mounted; `None` when there is no robot, so that only intrinsics can be estimated.
     pub mode: Option<Mode>,
-    /// What was looked at.
+    /// The target.
     pub target: TargetSpec,
-    /// What is known of the camera beforehand.
+    /// Prior knowledge of the camera.
     pub camera: Option<CameraInput>,
     /// The views in the order of the pose table, or in natural order of their names when there is none.
     pub entries: Vec<Entry>,
@@ -102,11 +102,11 @@ pub struct Dataset {
     pub image_size: Option<(u32, u32)>,
     /// The arm that the joint angles belong to, and whether they fit the poses; `None` when `[robot.arm]` is absent.
     pub arm: Option<DatasetArm>,
-    /// Where the tip of the tool is in the frame of the tip, metres, where `[robot]` says so.
+    /// Position of the tool's tip in the frame of the tip, metres, where `[robot]` states it.
     pub tool_m: Option<[f64; 3]>,
-    /// How accurate the robot is, millimetres, see [`RobotAccuracy`].
+    /// Accuracy of the robot, millimetres, see [`RobotAccuracy`].
     pub robot_accuracy_mm: Option<f64>,
-    /// What the tables name outside of the folder, through `../`.
+    /// Files outside of the folder that the tables name, through `../`.
     pub outside: Vec<String>,
     pose_table: Option<PathBuf>,
     /// Names in the data set of the text files.
@@ -116,13 +116,13 @@ pub struct Dataset {
     text_sha256: Vec<[u8; 32]>,
 }
 
-/// What `[camera]` says.
+/// Contents of `[camera]`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CameraInput {
     /// Whether the intrinsics are known and stay as they are.
     pub fixed: bool,
-    /// How good known intrinsics are: what they may displace points of the image by in each of their parameters, one standard
-    /// deviation, pixels; `None` where they are taken as exact.
+    /// Accuracy of known intrinsics: displacement of image points by each of their parameters, one standard deviation,
+    /// pixels; `None` where they are taken as exact.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accuracy_px: Option<f64>,
     /// The known intrinsics, or where an estimate starts; always there when `fixed`.
@@ -133,8 +133,8 @@ pub struct CameraInput {
 }
 
 impl Dataset {
-    /// Reads and checks a dataset folder that somebody at this machine has named. Images are only looked at for their size, so
-    /// that thousands are no burden.
+    /// Reads and checks a dataset folder that a user of this machine has named. Only the size of images is read, so that
+    /// thousands are no problem.
     ///
     /// # Errors
     /// [`DatasetError`] on the first defect, with file and row.
@@ -245,7 +245,7 @@ impl Dataset {
         Some(self.arm.as_ref()?.placement.clone().map(of))
     }
 
-    /// How accurate the robot is, with its tool; `None` where nothing was said of it.
+    /// Accuracy of the robot, with its tool; `None` where it is not stated.
     pub fn robot_accuracy(&self) -> Option<RobotAccuracy> {
         self.robot_accuracy_mm.map(|mm| RobotAccuracy::new(mm, self.tool_m))
     }
@@ -322,7 +322,7 @@ impl Dataset {
     }
 }
 
-/// A view before its image was looked at.
+/// A view before its image was read.
 struct View {
     name: String,
     /// Path in the data set.
@@ -358,7 +358,7 @@ impl EntryList<'_> {
         self.views.iter().enumerate().map(|(i, view)| (view.path.as_path(), i)).collect()
     }
 
-    /// Without a robot, images known by their corners alone are views as well; with one, they are a defect.
+    /// Without a robot, images that are only in the corner table are views as well; with one, they are an error.
     fn take_corner_images(&mut self, file: &TextFile, corners: &CornerTable) -> Result<(), DatasetError> {
         let known = self.index_of();
         let unknown = corners.iter().filter(|(path, _)| !known.contains_key(path.as_path()));
@@ -440,7 +440,7 @@ fn views(
     }
     let paths = images::list(folder)?;
     if paths.is_empty() && config.corners.is_none() {
-        // Without [robot] a table in the folder is not read, and says nothing of where the images are.
+        // Without [robot] a table in the folder is not read, and does not show where the images are.
         let has_table = template::tables(folder).next().is_some();
         let hint = if has_table { "; for images that a pose table names, dataset.toml needs [robot]" } else { "" };
         return Err(DatasetError::new(folder, None, DatasetProblem::NoImages(hint)));

@@ -5,7 +5,7 @@ use handeye_estimate::{CameraKnowledge, KnownLens, Observations, ObservedView};
 use handeye_geometry::targets::observation::Corners;
 
 impl CameraInput {
-    /// What a data set or a session with this table, or without one, knows of its camera.
+    /// Knowledge of the camera of a data set or a session with this table, or without one.
     pub fn knowledge(camera: Option<&Self>) -> CameraKnowledge {
         match camera {
             None => CameraKnowledge::NOTHING,
@@ -21,8 +21,8 @@ impl CameraInput {
 }
 
 impl Dataset {
-    /// What was observed. Where the data set has a corner table, its corners count; elsewhere `detected` gives those of
-    /// an entry by its index, `None` when the target was not found in its image.
+    /// The observations. Where the data set has a corner table, its corners are used; elsewhere `detected` gives those
+    /// of an entry by its index, `None` when the target was not found in its image.
     pub fn observations(&self, mut detected: impl FnMut(usize) -> Option<Corners>) -> Observations {
         let views = self.entries.iter().enumerate().map(|(index, entry)| {
             let corners = match &entry.corners {

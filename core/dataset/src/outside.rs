@@ -7,13 +7,13 @@ use super::text::TextFile;
 use handeye_files::bounds::Bounds;
 use handeye_files::own_folder::is_session;
 
-/// Whether a tidied path in a data set lies outside of it.
+/// Whether a normalized path in a data set is outside of it.
 pub(super) fn leaves(path: &Path) -> bool {
     path.components().next() == Some(Component::ParentDir)
 }
 
-/// Collects what lies outside. A data set may lie beside its images; a session has all that it needs, so that a name that
-/// leaves it was not written by this program.
+/// Collects files outside. A data set may be next to its images; a session is complete, so that a name outside of it was
+/// not written by this program.
 pub(super) struct Outside<'a> {
     folder: &'a Path,
     bounds: &'a Bounds,
@@ -41,7 +41,7 @@ impl<'a> Outside<'a> {
         Ok(())
     }
 
-    /// Says what lies outside and gives it.
+    /// Logs the files outside and returns them.
     #[cfg_attr(not(feature = "tracing"), expect(unused_variables, reason = "there is nobody to say it to"))]
     pub fn problems(self, table: Option<&TextFile>) -> Vec<String> {
         #[cfg(feature = "tracing")]

@@ -5,7 +5,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use handeye_geometry::frames::Pose;
 
-/// How far from 1 the length of a quaternion may be.
+/// Largest deviation of a quaternion's length from 1.
 const UNIT_TOLERANCE: f64 = 1e-6;
 
 #[derive(Serialize, Deserialize)]
@@ -34,7 +34,7 @@ impl Record {
 /// Writes it.
 ///
 /// # Errors
-/// Those of the serializer.
+/// Errors of the serializer.
 pub fn serialize<Dst, Src, S: Serializer>(pose: &Pose<Dst, Src>, serializer: S) -> Result<S::Ok, S::Error> {
     Record::of(pose).serialize(serializer)
 }
@@ -42,7 +42,7 @@ pub fn serialize<Dst, Src, S: Serializer>(pose: &Pose<Dst, Src>, serializer: S) 
 /// Reads it.
 ///
 /// # Errors
-/// Those of the deserializer, and a quaternion that has not unit length.
+/// Errors of the deserializer, and a quaternion that is not of unit length.
 pub fn deserialize<'de, Dst, Src, D: Deserializer<'de>>(deserializer: D) -> Result<Pose<Dst, Src>, D::Error> {
     Record::deserialize(deserializer)?.pose()
 }
@@ -54,7 +54,7 @@ pub mod optional {
     /// Writes it.
     ///
     /// # Errors
-    /// Those of the serializer.
+    /// Errors of the serializer.
     pub fn serialize<Dst, Src, S: Serializer>(pose: &Option<Pose<Dst, Src>>, serializer: S) -> Result<S::Ok, S::Error> {
         pose.as_ref().map(Record::of).serialize(serializer)
     }

@@ -12,8 +12,8 @@ use super::text::{Row, Table, TextFile};
 use crate::value::AngleUnit;
 use handeye_geometry::se3;
 
-/// How far the length of a quaternion may be from 1. Three printed decimals stay within it; swapped columns or
-/// another convention do not.
+/// Largest deviation of a quaternion's length from 1. Three printed decimals stay within it; swapped columns or another
+/// convention do not.
 pub(super) const UNIT_TOLERANCE: f64 = 1e-3;
 /// A length within this of 1 is 1 up to rounding.
 const ROUNDING: f64 = 1e-12;
@@ -24,7 +24,7 @@ const LARGEST_ANGLE_RAD: f64 = 4.0 * std::f64::consts::PI;
 pub(super) struct PoseRow {
     /// The image as the table names it.
     pub name: String,
-    /// Where it is in the data set.
+    /// Path in the data set.
     pub path: PathBuf,
     /// Line in the table.
     pub line: usize,
@@ -138,7 +138,7 @@ pub(super) fn unit_quaternion(q: Quaternion<f64>) -> Result<UnitQuaternion<f64>,
     if (length - 1.0).abs() > UNIT_TOLERANCE {
         return Err(DatasetProblem::NotUnit { length, tolerance: UNIT_TOLERANCE });
     }
-    // What is exact stays as it is, bit for bit: a session solves to the same numbers live and from its files.
+    // Exact values stay as they are, bit for bit: a session solves to the same numbers live and from its files.
     let is_exact = (length - 1.0).abs() < ROUNDING;
     Ok(if is_exact { UnitQuaternion::new_unchecked(q) } else { UnitQuaternion::from_quaternion(q) })
 }

@@ -8,7 +8,7 @@ use toml::Spanned;
 use super::error::DatasetProblem;
 use handeye_geometry::targets::{AprilGrid, AprilTag, Charuco, Dictionary, Grid, IdOrder, Layout, TargetSpec};
 
-/// What is wrong, and where.
+/// An error, and where it is.
 type Spanning = (Range<usize>, DatasetProblem);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -36,7 +36,7 @@ impl RawKind {
         }
     }
 
-    /// Keys that it has, beside `kind`, `corners`, `poses` and `pose`.
+    /// Keys that it has, in addition to `kind`, `corners`, `poses` and `pose`.
     fn keys(self) -> &'static [&'static str] {
         match self {
             Self::Chessboard | Self::Circles | Self::AsymmetricCircles => &["columns", "rows", "square_m"],
@@ -49,7 +49,7 @@ impl RawKind {
     }
 }
 
-/// The table as it is written. Which keys belong together, the kind says.
+/// The table as it is written. The kind determines which keys belong together.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawTarget {
@@ -70,11 +70,11 @@ pub(super) struct RawTarget {
     ids: Option<Spanned<IdOrder>>,
     pub corners: Option<String>,
     pub poses: Option<String>,
-    /// What the poses of the target are.
+    /// Direction of the target's poses.
     pub pose: Option<TargetPoseDirection>,
 }
 
-/// What a row of target poses states.
+/// Direction of a row of target poses.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum TargetPoseDirection {

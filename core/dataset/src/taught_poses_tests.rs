@@ -204,7 +204,7 @@ fn another_arm_base_or_target_is_another_cell() {
         tip_at_zero_m: Some([0.8, 0.2, 0.0]),
         target: target(0.015),
     };
-    // As computed again for another connection.
+    // As computed again for another connection, with rounding.
     let again = TaughtOn { tip_at_zero_m: Some([0.8 + 1e-9, 0.2, 0.0]), ..cell.clone() };
     assert!(cell.is_same(&again));
     let others = [

@@ -1,5 +1,5 @@
-//! A `dataset.toml` for a folder that has none: what was found is filled in, and what only a person can know is left to be
-//! chosen, so that the text is refused until every choice is made.
+//! A `dataset.toml` for a folder that has none: what was found is filled in, and what only the user can know is left as
+//! choices, so that the text is refused until every choice is made.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -12,7 +12,7 @@ use super::outside::leaves;
 use super::text::{TextFile, records, resolve};
 use handeye_geometry::natural_order;
 
-/// What stands before a line that a person has to decide about.
+/// Prefix of a line that the user has to decide on.
 pub const CHOICE: &str = "#? ";
 
 /// Endings of tables, in lower case.
@@ -20,8 +20,8 @@ const TABLES: [&str; 3] = ["csv", "txt", "tsv"];
 
 /// The text of a `dataset.toml` for a folder, by what is in it; `None` for a folder with neither images nor tables.
 ///
-/// Units, directions, the place of the camera and the target are never taken from the numbers: each stands as a line per
-/// possibility behind [`CHOICE`], of which a person takes one in.
+/// Units, directions, the place of the camera and the target are never taken from the numbers: each has one line per
+/// possibility after [`CHOICE`], and the user enables one of them.
 pub fn template(folder: &Path) -> Option<String> {
     let tables: Vec<Found> = tables(folder).filter_map(|name| Found::read(folder, &name)).collect();
     let images = images_of(folder, &tables);
@@ -61,7 +61,7 @@ struct Found {
 }
 
 enum Kind {
-    /// `image,x,y,z` and one of the sets of rotation columns, with these keywords; then so many joint angles.
+    /// `image,x,y,z` and one of the sets of rotation columns, with these keywords; then this many joint angles.
     Poses {
         rotations: &'static [&'static str],
         joints: usize,
@@ -125,7 +125,7 @@ fn images_of(folder: &Path, tables: &[Found]) -> Vec<PathBuf> {
     images
 }
 
-/// How many images there are of every size.
+/// Number of images of every size.
 fn sizes(folder: &Path, images: &[PathBuf]) -> BTreeMap<(u32, u32), usize> {
     let mut sizes = BTreeMap::new();
     for size in images.iter().filter_map(|image| handeye_images::image_size(&folder.join(image)).ok()) {
@@ -143,7 +143,7 @@ impl Text {
         let _ok = writeln!(self.0, "{line}").is_ok();
     }
 
-    /// What a comment says stands on one line, whatever a file is called.
+    /// A comment is on one line, whatever the name of a file is.
     fn comment(&mut self, comment: impl std::fmt::Display) {
         let comment = handeye_wording::one_line(&comment);
         self.line(format!("# {}", comment.replace(char::is_control, " ")).trim_end());

@@ -83,7 +83,7 @@ fn every_rotation_that_is_read_has_a_template_that_is_read() {
         let folder = folder(&[("1.png", 8, 6)], &[("poses.csv", &table)]);
         let text = template(folder.path()).expect("a template");
         let decisions = [&BOARD[..], &["length_unit = \"m\"", "pose = \"tip_from_base\""], own].concat();
-        // With all decisions it is read, and without any one of them it is not: none has a default.
+        // With all decisions it is read, and if any one is missing it is not: none has a default.
         for left_out in std::iter::once(None).chain((0..decisions.len()).map(Some)) {
             let mut taken = decisions.clone();
             if let Some(index) = left_out {

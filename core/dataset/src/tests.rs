@@ -205,7 +205,7 @@ fn target_poses_make_pose_pairs_without_images() {
 #[test]
 fn target_poses_may_state_the_camera_in_the_target() {
     let poses = "image,x,y,z,qx,qy,qz,qw\n1,0,0,0,0,0,0,1\n";
-    // Half a turn about x: the camera stands before the target, which it sees at the same distance.
+    // Half a turn about x: the camera is in front of the target, which it sees at the same distance.
     let row = "image,x,y,z,qx,qy,qz,qw\n1,0.1,0,0.5,1,0,0,0\n";
     for (key, seen) in [("camera_from_target", [0.1, 0.0, 0.5]), ("target_from_camera", [-0.1, 0.0, 0.5])] {
         let target = format!("{TARGET}poses = \"target_poses.csv\"\npose = \"{key}\"\n");

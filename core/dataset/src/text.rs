@@ -106,7 +106,7 @@ pub(super) struct Row {
 }
 
 impl Row {
-    /// What a cell says. Every row has as many cells as the header, which is checked on parsing.
+    /// Contents of a cell. Every row has as many cells as the header, which is checked on parsing.
     pub fn text(&self, column: usize) -> &str {
         &self.cells[column]
     }
@@ -121,7 +121,7 @@ pub(super) struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
-    /// Reads a table whose header is one of `headers`, in this order. `why` tells what an empty table should hold.
+    /// Reads a table whose header is one of `headers`, in this order. `why` states what an empty table should hold.
     pub fn parse(file: &'a TextFile, headers: &[Vec<&'static str>], why: &'static str) -> Result<Self, DatasetError> {
         let path = file.path.as_path();
         let mut records = records(file)?;
@@ -228,7 +228,7 @@ fn match_header(got: &[String], headers: &[Vec<&'static str>]) -> Result<Vec<&'s
         return Ok(header.clone());
     }
     let expected = headers.iter().map(|h| h.join(",")).collect::<Vec<_>>().join(" or ");
-    // The nearest of the allowed headers tells best what is wrong.
+    // The nearest of the allowed headers shows best what is wrong.
     let misses = |header: &&Vec<&'static str>| header.iter().filter(|&&name| got.iter().all(|g| g != name)).count();
     let Some(nearest) = headers.iter().min_by_key(misses) else {
         return Err(DatasetProblem::ColumnOrder { expected });

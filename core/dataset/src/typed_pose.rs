@@ -5,14 +5,14 @@ use serde::{Deserialize, Serialize};
 
 use handeye_geometry::se3;
 
-/// How far the length of a quaternion, or of an axis of a matrix, may be from 1: three printed decimals.
+/// Largest deviation of the length of a quaternion, or of an axis of a matrix, from 1: three printed decimals.
 const UNIT_TOLERANCE: f64 = 1e-3;
 /// Largest angle that a controller reports \[rad\]: joints turn up to two full turns either way.
 const LARGEST_ANGLE_RAD: f64 = 4.0 * std::f64::consts::PI;
 /// No arm on a table reaches further \[m\].
 const FARTHEST_M: f64 = 100.0;
 
-/// How the rotation is written.
+/// Notation of the rotation.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TypedRotation {
@@ -57,14 +57,14 @@ impl TypedRotation {
     }
 }
 
-/// Why a text is no pose in its convention.
+/// Why a text is not a pose in its convention.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum TypedPoseError {
-    /// A word that is no number.
+    /// A word that is not a number.
     #[error("{word:?} is not a number")]
     NoNumber {
-        /// What was typed.
+        /// The typed word.
         word: String,
     },
     /// Too few or too many.
@@ -152,7 +152,7 @@ fn turn(numbers: &[f64], rotation: TypedRotation) -> Result<UnitQuaternion<f64>,
         }
         TypedRotation::QuaternionXyzw => unit(Quaternion::new(numbers[3], numbers[0], numbers[1], numbers[2])),
         TypedRotation::QuaternionWxyz => unit(Quaternion::new(numbers[0], numbers[1], numbers[2], numbers[3])),
-        // It has no three numbers of its own.
+        // It is not given by three numbers.
         TypedRotation::Matrix => Err(TypedPoseError::NoRotation),
     }
 }
@@ -169,7 +169,7 @@ fn numbers(text: &str) -> Result<Vec<f64>, TypedPoseError> {
         .collect()
 }
 
-/// Words that a pendant shows beside its numbers.
+/// Words that a pendant shows next to its numbers.
 fn is_name(word: &str) -> bool {
     const NAMES: [&str; 24] = [
         "p", "x", "y", "z", "rx", "ry", "rz", "a", "b", "c", "w", "r", "qx", "qy", "qz", "qw", "mm", "m", "deg", "rad",

@@ -12,17 +12,17 @@ use handeye_geometry::targets::TargetSpec;
 /// Name of the pose table that [`description`] points to.
 pub const POSE_TABLE: &str = "poses.csv";
 
-/// What a pose table by [`pose_table_with_joints`] has the joint values of.
+/// The arm of the joint values in a pose table by [`pose_table_with_joints`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Joints<'a> {
-    /// Of this arm.
+    /// This arm.
     Of(&'a ArmModel),
-    /// Of an arm that is not known, with so many joints: they are kept, and not used.
+    /// An unknown arm with this many joints: the values are kept, and not used.
     Count(usize),
 }
 
 impl Joints<'_> {
-    /// How many; `None` for an arm that is none.
+    /// Number of joints; `None` for an invalid arm.
     pub fn count(self) -> Option<usize> {
         match self {
             Self::Of(model) => Some(model.arm().ok()?.joint_count()),
@@ -31,14 +31,14 @@ impl Joints<'_> {
     }
 }
 
-/// What is said of the robot beside its poses.
+/// Facts about the robot in addition to its poses.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Robot<'a> {
     /// The joint values in the pose table.
     pub joints: Option<Joints<'a>>,
-    /// Where the tip of the tool is in the frame of the tip, metres.
+    /// Position of the tool's tip in the frame of the tip, metres.
     pub tool_m: Option<[f64; 3]>,
-    /// How accurate it is, millimetres.
+    /// Accuracy of the robot, millimetres.
     pub accuracy_mm: Option<f64>,
 }
 

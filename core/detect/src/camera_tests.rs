@@ -67,7 +67,7 @@ fn derivatives_equal_those_of_opencv() {
         let (_, jacobian) = by_opencv(&camera, &points);
         let columns = jacobian.cols() as usize;
         let values = numbers(&jacobian).expect("numbers");
-        // Where OpenCV keeps the derivatives by translation and by focal length, centre and distortion.
+        // Where OpenCV stores the derivatives by translation and by focal length, centre and distortion.
         let (translation, parameters) = match camera.distortion {
             Distortion::Fisheye(_) => (11, 0),
             _ => (3, 6),

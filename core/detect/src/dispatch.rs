@@ -25,21 +25,21 @@ pub fn detect(image: &GrayImage, target: &TargetSpec) -> Result<Option<Corners>,
 /// Finds the points of the target, to a few hundredths of a pixel; `None` when it is not in the image.
 ///
 /// `Corner::index` is the number of the point in [`TargetSpec::points`], ascending; pixel (0, 0) is the centre of the
-/// top-left pixel. All points of chessboards and grids of dots are found, or none. Of `ChArUco` boards and boards of tags
-/// those in sight are, when they are at least four and not on a line, and the markers that tell them apart are two or
-/// more that lie as the target has them. The order is right-handed in the image, that is, the target's x × y points into
-/// the board, away from the camera, and is the same in every view:
+/// top-left pixel. All points of chessboards and grids of dots are found, or none. For `ChArUco` boards and boards of
+/// tags those in sight are found, when they are at least four and not on a line, and at least two of the markers that
+/// identify them are placed as on the target. The order is right-handed in the image, that is, the target's x × y points
+/// into the board, away from the camera, and is the same in every view:
 ///
 /// - a chessboard begins at the end where the square between its first four corners is dark;
 /// - a grid of dots begins at the larger dot, where one of its corners has one;
-/// - markers and shifted rows of dots say by themselves where a target begins.
+/// - markers and shifted rows of dots define where a target begins.
 ///
 /// # Symmetric targets
-/// Where that leaves a choice ([`TargetSpec::is_symmetric`]: boards of even sum, plain grids of dots), the end is
-/// taken from which the x axis points most to the right in the image. The same board turned by more than a quarter
-/// turn between two views is then numbered from the other end, and no detector can know; views of such a target must
-/// be kept within a quarter turn around the optical axis. A symmetric board that is printed with light first squares
-/// at all ends is accepted and follows the same rule.
+/// Where that leaves a choice ([`TargetSpec::is_symmetric`]: boards of even sum, plain grids of dots), the end is taken
+/// from which the x axis points most to the right in the image. The same board turned by more than a quarter turn
+/// between two views is then numbered from the other end, and no detector can detect that; views of such a target must
+/// be kept within a quarter turn around the optical axis. A symmetric board that is printed with light first squares at
+/// all ends is accepted and follows the same rule.
 ///
 /// # Errors
 /// [`VisionError::TargetTooSmall`] for a chessboard or a grid of dots below 3 points a side, [`VisionError::BadTarget`]

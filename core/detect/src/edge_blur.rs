@@ -1,4 +1,4 @@
-//! How blurred the edges of a chessboard are.
+//! Blur of the edges of a chessboard.
 
 use image::GrayImage;
 use nalgebra::Vector2;
@@ -19,7 +19,7 @@ const MIN_CONTRAST: f64 = 10.0;
 const MIN_EDGES: usize = 3;
 
 /// Largest blur (1σ) as a part of a square's side. The corner fit sees 0.42 of a square to either side of an edge; at
-/// this blur that is 2.8σ, just enough for both levels to be seen, so that contrast and blur can be told apart. By then
+/// this blur that is 2.8σ, just enough for both levels to be seen, so that contrast and blur can be separated. By then
 /// noise moves a corner twice as far as in a sharp image.
 pub const MAX_BLUR_SHARE: f64 = 0.15;
 
@@ -36,9 +36,9 @@ impl EdgeBlur {
     /// Measures it: the median over edges, of the direction of edges that is more blurred (a moving camera blurs those
     /// across its motion).
     ///
-    /// Each edge between two neighbouring corners is a straight line. Of pixels beside it the level is compared with
-    /// that of the square that they lie in; for an edge blurred by a Gaussian the deviations sum up, along the normal,
-    /// to `σ √(2/π)` times the contrast. Sums are taken with their sign, so that noise cancels. Right to a tenth
+    /// Each edge between two neighbouring corners is a straight line. The level of pixels next to it is compared with
+    /// that of the square that they are in; for an edge blurred by a Gaussian the deviations sum up, along the normal,
+    /// to `σ √(2/π)` times the contrast. Sums are taken with their sign, so that noise cancels. Accurate to a tenth
     /// between 0.5 px and [`MAX_BLUR_SHARE`] of the square; smaller blurs are overestimated by up to 0.3 px along rows
     /// and columns of pixels, larger ones end at a fifth of the square.
     ///
@@ -54,7 +54,7 @@ impl EdgeBlur {
         [along_rows, along_columns].into_iter().flatten().max_by(|a, b| share(a).total_cmp(&share(b)))
     }
 
-    /// Whether corners cannot be measured well in it, see [`MAX_BLUR_SHARE`].
+    /// Whether corners cannot be measured well with this blur, see [`MAX_BLUR_SHARE`].
     pub fn is_too_blurred(&self) -> bool {
         self.sigma_px > MAX_BLUR_SHARE * self.square_px
     }

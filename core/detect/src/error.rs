@@ -1,14 +1,14 @@
-//! Why there is no detection.
+//! Why a detection is not possible.
 
 use handeye_geometry::progress::CancelToken;
 
-/// Why there is no detection.
+/// Why a detection is not possible.
 ///
 /// A board that is simply not in the image is not an error: [`detect`](super::detect) returns `None`.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum VisionError {
-    /// The target cannot be looked for.
+    /// The target cannot be searched.
     #[error("a target of {columns}×{rows} points cannot be detected: it needs at least 3 points along either side")]
     TargetTooSmall {
         /// Points along x.
@@ -19,7 +19,7 @@ pub enum VisionError {
     /// A number of the target is out of range.
     #[error("the target cannot be detected: {source}")]
     BadTarget {
-        /// Which, and what it may be.
+        /// The dimension, and its valid range.
         #[from]
         source: handeye_geometry::targets::BadTarget,
     },
@@ -48,9 +48,9 @@ pub enum VisionError {
     /// OpenCV refused or failed.
     #[error("OpenCV could not {operation}: {message}")]
     OpenCv {
-        /// What it was asked to do.
+        /// The operation.
         operation: &'static str,
-        /// What it said.
+        /// Its error message.
         message: String,
     },
 }

@@ -1,4 +1,4 @@
-//! Our calibration of the camera beside OpenCV's `calibrateCamera` and `fisheye::calibrate` on the same corners.
+//! Our calibration of the camera compared with OpenCV's `calibrateCamera` and `fisheye::calibrate` on the same corners.
 //!
 //! OpenCV takes corners and points in single precision; here both are such numbers, so that the two have the same
 //! optimum to the last digits. The unit of length is 1/32 of the real one for the same reason.

@@ -1,4 +1,4 @@
-//! What a kept image is worth: the board's corners and how blurred its edges are.
+//! Evaluation of a kept image: the board's corners and the blur of its edges.
 
 use image::{GrayImage, RgbImage};
 
@@ -13,7 +13,7 @@ use handeye_images::gray_from_rgb;
 pub struct Sighting {
     /// Its points in sight.
     pub corners: Corners,
-    /// How blurred it is; `None` for a board without straight edges, or too small to tell.
+    /// Blur of the edges; `None` for a board without straight edges, or too small to measure it.
     pub blur: Option<EdgeBlur>,
 }
 

@@ -1,4 +1,4 @@
-//! How targets are looked for, and whether one can be.
+//! Options of the search for targets, and whether a search is possible.
 
 use image::GrayImage;
 
@@ -6,7 +6,7 @@ use crate::VisionError;
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::{Grid, TargetSpec};
 
-/// How long a detection may take.
+/// Time limit of a detection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Effort {
     /// The quick methods, for every frame of a live stream: a miss costs a few times what a hit does.
@@ -21,7 +21,7 @@ pub enum Effort {
 #[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub struct DetectOptions {
-    /// How long it may take.
+    /// Time limit.
     pub effort: Effort,
     /// Ends the search early: of a chessboard within a row of the image, of others between two calls of OpenCV.
     pub cancel: CancelToken,
@@ -45,7 +45,7 @@ impl DetectOptions {
     }
 }
 
-/// Whether there is something to search, and something to search for.
+/// Whether image and target can be searched.
 pub(super) fn check(image: &GrayImage, target: &TargetSpec) -> Result<(), VisionError> {
     match target {
         TargetSpec::Chessboard(grid) | TargetSpec::Circles(grid) | TargetSpec::AsymmetricCircles(grid) => {

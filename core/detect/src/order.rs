@@ -14,7 +14,7 @@ use handeye_geometry::targets::observation::{Corner, Corners};
 #[derive(Debug, Clone)]
 pub(super) struct Ordered {
     pub points: Vec<Vector2<f64>>,
-    /// How well each point is known, squared pixels; `None` where that is not known.
+    /// Covariance of each point, squared pixels; `None` where that is not known.
     pub covariances_px2: Vec<Option<Matrix2<f64>>>,
     /// The covariance of x and y of each point in turn, where they do not err independently.
     pub together_px2: Option<DMatrix<f64>>,
@@ -26,7 +26,7 @@ impl Ordered {
         Self { covariances_px2: vec![None; points.len()], together_px2: None, points, columns: grid.columns }
     }
 
-    /// Of points that do not err independently.
+    /// Points whose errors are correlated.
     pub fn together(points: Vec<Vector2<f64>>, covariance_px2: DMatrix<f64>, columns: usize) -> Self {
         let own = |i| {
             let block: Matrix2<f64> = covariance_px2.fixed_view::<2, 2>(2 * i, 2 * i).into_owned();
@@ -47,7 +47,7 @@ impl Ordered {
         Corners::together(corners, self.together_px2.as_ref().and_then(CornerCovariance::new))
     }
 
-    /// The points in another order: `place` says where each is taken from.
+    /// The points in another order: `place` gives the source of each.
     fn rearranged(&self, columns: usize, place: impl Iterator<Item = usize> + Clone) -> Self {
         let together = |all: &DMatrix<f64>| {
             let numbers: Vec<usize> = place.clone().flat_map(|i| [2 * i, 2 * i + 1]).collect();
@@ -76,7 +76,7 @@ impl Ordered {
 
     /// Where the diagonals of a cell cross: the image of its centre under any perspective.
     ///
-    /// Parallel diagonals belong to no image of a square; then the mean of the corners stands in.
+    /// Parallel diagonals cannot be the image of a square; then the mean of the corners is used.
     pub fn cell_centre(&self, column: usize, row: usize) -> Vector2<f64> {
         let [a, b, c, d] = self.cell(column, row);
         let (p, q) = (c - a, d - b);
@@ -129,7 +129,7 @@ impl Ordered {
     }
 
     /// Whether every point lies near the middle of its two neighbours along either axis: at most `max_bend` of their
-    /// distance away. A grid assembled from stray points does not.
+    /// distance away. A grid of stray points fails this.
     pub fn is_smooth(&self, max_bend: f64) -> bool {
         let straight =
             |a: Vector2<f64>, b: Vector2<f64>, c: Vector2<f64>| (b - (a + c) / 2.0).norm() <= max_bend * (c - a).norm();

@@ -1,9 +1,9 @@
-//! Our poses of a flat target beside OpenCV's: both starts by `SOLVEPNP_IPPE`, refined by `solvePnPRefineLM` through the
-//! same lens, which the fisheye model lacks.
+//! Our poses of a flat target compared with OpenCV's: both starts by `SOLVEPNP_IPPE`, refined by `solvePnPRefineLM`
+//! through the same lens, which the fisheye model lacks.
 //!
 //! OpenCV's refinement gives up in the valleys between two minima that nearly merge, and on the way out of a start that
-//! leads to no second minimum: a tenth of its second poses are no minima. So its poses are compared as they come, where
-//! only their error counts, and after they were let down to the minimum below them by our own descent, where the poses do.
+//! leads to no second minimum: a tenth of its second poses are not minima. So its poses are compared as they are, where
+//! only their error counts, and after our own descent to the minimum below them, where the poses count.
 
 use nalgebra::{Isometry3, Point3, Vector2};
 use opencv::calib3d::{SolvePnPMethod, solve_pnp_generic, solve_pnp_refine_lm};
@@ -133,14 +133,14 @@ fn pose_of(rotation: &Mat, translation: &Mat) -> Isometry3<f64> {
     isometry(&three(rotation), &three(translation))
 }
 
-/// How ours and OpenCV's differ.
+/// Differences between ours and OpenCV's.
 #[derive(Debug, Default)]
 struct Tally {
     /// Views whose better pose has the same error as OpenCV's, a lower one, a higher one.
     same: usize,
     lower: usize,
     higher: usize,
-    /// Second poses of OpenCV that are no minima.
+    /// Second poses of OpenCV that are not minima.
     no_minima: usize,
     /// Views with two minima, and those whose minima are not those below OpenCV's poses.
     two: usize,
@@ -205,7 +205,7 @@ impl Tally {
 fn check(views: usize, seed: u64) {
     let tally = Tally::of(views, seed);
     assert_eq!(tally.higher, 0, "a pose of OpenCV fits better");
-    // Where two minima are about to merge, their number is a matter of rounding.
+    // Where two minima are about to merge, their number depends on rounding.
     assert!(tally.differ * 1000 <= views, "{tally:?}");
     assert!(tally.two > views / 2, "the views do not test what they should");
 }

@@ -10,10 +10,10 @@ use handeye_geometry::targets::{AprilGrid, AprilTag, Charuco, Dictionary, Grid, 
 use handeye_geometry::testing::looking_at_point;
 use handeye_simulate::Scene;
 
-/// Where a corner may be. With noise of one grey level and this blur the fits have 0.005 to 0.014 px RMS, so that three to
-/// four deviations of the worst are within.
+/// Largest error of a corner. With noise of one grey level and this blur the fits have 0.005 to 0.014 px RMS, so that
+/// three to four deviations of the worst are within.
 const EXACT_PX: f64 = 0.05;
-/// Likewise for the RMS over a view, of as few as four corners.
+/// The same for the RMS over a view, of as few as four corners.
 const RMS_PX: f64 = 0.02;
 
 fn camera() -> Intrinsics {
@@ -109,7 +109,7 @@ fn the_corners_of_a_single_tag_are_found_where_they_are() {
 
 #[test]
 fn centres_of_dots_are_those_of_the_dots_and_not_of_their_images() {
-    // The centres of the ellipses are up to 0.25 px beside at these angles.
+    // The centres of the ellipses are off by up to 0.25 px at these angles.
     whole(TargetSpec::Circles(Grid { columns: 7, rows: 5, square_m: 0.03 }), 0.45, camera());
     whole(TargetSpec::AsymmetricCircles(Grid { columns: 4, rows: 7, square_m: 0.025 }), 0.45, camera());
 }
@@ -124,7 +124,7 @@ fn a_lens_that_bends_the_board_does_not_move_its_corners() {
     }
 }
 
-/// Corners that are at least so far inside of what is left of the image must be found: their tags or markers are wholly
+/// Corners that are at least this far inside of the rest of the image must be found: their tags or markers are wholly
 /// in sight.
 const CLEAR_PX: f64 = 80.0;
 

@@ -1,4 +1,4 @@
-//! The arm's own errors within a calibration: what they are, and the transforms that go with them.
+//! The arm's own errors within a calibration: their values, and the transforms that belong to them.
 
 use nalgebra::{DMatrix, Matrix6};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
@@ -20,33 +20,34 @@ use handeye_geometry::targets::bent::BoardShape;
 use handeye_geometry::view_equations::DepthBias;
 
 /// The errors of the robot's arm as the views show them, and the calibration by the tip poses that they make. Both transforms are
-/// to be used with corrected poses alone: those of the controller go with those of [`Fit::hand_eye`](crate::Fit::hand_eye).
+/// for corrected poses only: the controller's poses go with the transforms of [`Fit::hand_eye`](crate::Fit::hand_eye).
 #[derive(Debug, Clone)]
 pub struct ArmFit {
     /// The errors of the joints and links, with covariance and levels.
     pub errors: ArmErrors,
     /// Both rigid links, by corrected tip poses.
     pub hand_eye: HandEye,
-    /// What was estimated beside them.
+    /// What was estimated together with them.
     pub beside: BesideArm,
-    /// Covariance of both links, everything beside and, at its end, the errors of the arm, as in [`JointSolution::covariance`].
+    /// Covariance of both links, everything else estimated and, at its end, the errors of the arm, as in
+    /// [`JointSolution::covariance`].
     pub covariance: DMatrix<f64>,
     /// How the error of the hand-eye transform is distributed in units of that.
     pub small_sample: SmallSample,
-    /// Noise levels, those of the arm's errors among them; what of the robot remains is what its links do not explain.
+    /// Noise levels, including those of the arm's errors; the noise of the robot is what its links do not explain.
     pub noise: Noise,
-    /// By how much the covariance was widened, because the data scatter more than the noise levels say.
+    /// By how much the covariance was widened, because the data scatter more than the noise levels explain.
     pub widening: Overdispersion,
-    /// RMS of 2-D corner residuals on views left out \[px\], by reported poses as they are and by corrected ones; `None` with too few
-    /// views.
+    /// RMS of 2-D corner residuals on views left out \[px\], by reported poses as they are and by corrected ones; `None` with too
+    /// few views.
     pub heldout_px: Option<[f64; 2]>,
-    /// Whether views left out contradict the errors: they are predicted worse by corrected poses than by reported ones, by more than
-    /// chance, and worse than the model of the arm itself explains. An exact arm is predicted a little worse by its corrected poses,
-    /// which the uncertainty of the errors says.
+    /// Whether views left out contradict the errors: they are predicted worse by corrected poses than by reported ones, by more
+    /// than chance, and worse than the model of the arm itself explains. An exact arm is predicted a little worse by its corrected
+    /// poses, as the uncertainty of the errors predicts.
     pub contradicted: bool,
 }
 
-/// What was estimated beside the errors of an arm and both links.
+/// What was estimated in addition to the errors of an arm and both links.
 #[derive(Debug, Clone)]
 pub struct BesideArm {
     /// The lens, estimated or as given.
@@ -55,17 +56,17 @@ pub struct BesideArm {
     pub shape: BoardShape,
     /// Errors of the depths; none where they were not estimated.
     pub depth: DepthBias,
-    /// What of all that was free.
+    /// Which of all these were free.
     pub free: Free,
 }
 
-/// Gain of minus twice the log-likelihood, integrated over what is known of sizes beforehand, from which the size of the target is free:
-/// by chance one session in a hundred, of a target that is as stated (chi-square with one degree of freedom).
+/// Gain of minus twice the log-likelihood, integrated over the prior of the size, from which the size of the target is free:
+/// reached by chance in one session in a hundred with a target that is as stated (chi-square with one degree of freedom).
 const SIZE_GAIN: f64 = 6.63;
 
-/// Standard deviations by which a size has to be off for nothing else to be taken for it: one in a thousand is off by 3.3, and what is in
-/// no model has made standard deviations three times too small in recorded sessions. Poses that are read while the arm moves from view to
-/// view look like a target that is smaller by four of them.
+/// Standard deviations by which a size has to be off for nothing else to be taken for it: one in a thousand is off by 3.3, and
+/// unmodelled effects have made standard deviations three times too small in recorded sessions. Poses that are read while the arm
+/// moves from view to view look like a target that is smaller by four of them.
 const CERTAIN: f64 = 10.0;
 
 impl ArmFit {
@@ -75,8 +76,8 @@ impl ArmFit {
         self.covariance.view((first, first), (count, count)).into_owned()
     }
 
-    /// Covariance of `[mount_from_camera (6), anchor_from_target (6), errors of the arm]`, metres and radians; right perturbations. The
-    /// uncertainty of the lens and of everything else that is estimated is in it.
+    /// Covariance of `[mount_from_camera (6), anchor_from_target (6), errors of the arm]`, metres and radians; right perturbations.
+    /// The uncertainty of the lens and of everything else that is estimated is in it.
     pub(crate) fn links_and_errors_covariance(&self) -> DMatrix<f64> {
         let (count, first) = self.error_places();
         let kept: Vec<usize> = (0..12).chain(first..first + count).collect();
@@ -96,13 +97,14 @@ impl ArmFit {
             .collect()
     }
 
-    /// Standard deviations of the lens that goes with them, in the order of [`Intrinsics::parameters`]; empty when it was given.
+    /// Standard deviations of the lens that belongs to them, in the order of [`Intrinsics::parameters`]; empty when it was
+    /// given.
     pub fn intrinsics_sigma(&self) -> Vec<f64> {
         let lens = 12..12 + self.beside.free.form().warp_at(&self.beside.intrinsics);
         lens.map(|i| self.deviation(i)).collect()
     }
 
-    /// The shape of the target that goes with them; `None` when it was given.
+    /// The shape of the target that belongs to them; `None` when it was given.
     pub fn shape(&self) -> Option<ShapeEstimate> {
         let BesideArm { intrinsics, shape, free, .. } = &self.beside;
         let form = free.form();
@@ -116,8 +118,8 @@ impl ArmFit {
         self.covariance[(index, index)].max(0.0).sqrt()
     }
 
-    /// What it says of both links of a calibration by reported poses, which knows nothing of the arm's errors: the camera on its mount,
-    /// and the target.
+    /// What it implies for both links of a calibration by reported poses, which does not model the arm's errors: the camera on its
+    /// mount, and the target.
     pub fn of_links(&self, answer: &HandEye) -> [Alternative; 2] {
         let shifts = [
             se3::log((answer.mount_from_camera().inverse() * self.hand_eye.mount_from_camera()).isometry()),
@@ -128,9 +130,9 @@ impl ArmFit {
     }
 }
 
-/// The same with the size of the target free, where the views ask for it: a target that is some thousandths larger than stated makes
-/// an arm look as much longer, by more than its own errors. Some real arms are longer in all links by a thousandth or two, which no
-/// view tells from such a target: a size that is off by less than prints may be is left as stated.
+/// The same with the size of the target free, where the views require it: a target that is some thousandths larger than stated
+/// makes an arm look as much longer, by more than its own errors. Some real arms are longer in all links by a thousandth or two,
+/// which no view distinguishes from such a target: a size that is off by less than prints may be is left as stated.
 fn with_shown_size<'a>(
     stated: &JointProblem<'a>,
     fit: JointSolution,
@@ -139,7 +141,7 @@ fn with_shown_size<'a>(
     let sized = JointProblem { free: Free { scale: true, ..stated.free }, ..*stated };
     let by_size = if stated.free.scale { None } else { determined(joint::fit(&sized, &fit.as_start(), *work))? };
     let by_size = by_size.filter(|by_size| {
-        // The prior of the size is among the equations, but for its height.
+        // The prior of the size is among the equations, except for its constant.
         let both = by_size.deviance.zip(fit.deviance);
         let is_likelier = both.is_some_and(|(sized, stated)| stated - (sized + 2.0 * SIZE_SIGMA.ln()) > SIZE_GAIN);
         is_likelier && (by_size.shape.scale - 1.0).abs() >= LEAST_SCALE
@@ -147,8 +149,8 @@ fn with_shown_size<'a>(
     Ok(by_size.map_or((*stated, fit), |by_size| (sized, by_size)))
 }
 
-/// The covariance where the size that was found is not certain: it and the stated one are as likely, and half the square of their
-/// difference is added to its variance, with what rests on it.
+/// The covariance where the estimated size is not certain: it and the stated one are equally likely, and half the square of their
+/// difference is added to its variance, with what depends on it.
 fn with_uncertain_size(fit: &JointSolution) -> Option<DMatrix<f64>> {
     let sigma = fit.scale_sigma()?;
     let off = (fit.shape.scale - 1.0).abs() / sigma;
@@ -156,15 +158,15 @@ fn with_uncertain_size(fit: &JointSolution) -> Option<DMatrix<f64>> {
     (off < CERTAIN).then(|| overdispersion::with_less_known(&fit.covariance, at..at + 1, 1.0 + 0.5 * off * off))
 }
 
-/// How many times as large as is expected the RMS of the residuals of so many views is by chance, once in twenty: what a pose is off has
-/// six numbers, and they make up most of it.
+/// Factor by which the RMS residual of this many views exceeds its expectation by chance, once in twenty: a pose error has six
+/// numbers, and they make up most of it.
 fn by_chance(views: usize) -> f64 {
     let numbers = 6.0 * views as f64;
     ChiSquared::new(numbers).map_or(f64::INFINITY, |law| (law.inverse_cdf(0.95) / numbers).sqrt())
 }
 
-/// The errors of the arm by the views of a joint estimate; `None` where these do not know its joints, where the noise levels are
-/// given, and where there is no answer with them.
+/// The errors of the arm by the views of a joint estimate; `None` where the views have no joint values, where the noise levels
+/// are given, and where there is no answer with them.
 pub(crate) fn arm_fit(
     problem: &JointProblem<'_>,
     solution: &JointSolution,
@@ -176,7 +178,7 @@ pub(crate) fn arm_fit(
         return Ok(None);
     }
     let Some(fit) = determined(joint::fit(&with, &solution.as_start(), *work))? else { return Ok(None) };
-    // A size that is asked for is not the one that was stated.
+    // A requested size is not the stated one.
     let is_asked = with.free.scale;
     let (with, fit) = with_shown_size(&with, fit, work)?;
     let (with, fit) = match with_shown_field(&with, with.views, &fit, *work)? {
@@ -184,7 +186,8 @@ pub(crate) fn arm_fit(
         None => (with, fit),
     };
     let Some(fit) = determined(joint::with_stated_error(&with, fit, work.cancel))? else { return Ok(None) };
-    // Of several sessions with one lens what that does beyond its model is as uncertain here as by the views of this one.
+    // With a lens shared by several sessions, its residual distortion is as uncertain here as by the views of this
+    // session.
     let stated = determined(shown.with_their_error(&with, fit, work.cancel))?;
     let Some((mut fit, _)) = stated else { return Ok(None) };
     let Some(errors) = fit.arm.clone() else { return Ok(None) };

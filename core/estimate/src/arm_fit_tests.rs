@@ -50,7 +50,7 @@ fn corrected_poses_predict_what_reported_ones_do_not() {
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
         let (arm, [reported, corrected]) = predicted(&with(mode, ArmError::Links(OFF_LINKS), 5), 20);
         println!("{mode:?}: {reported:.3} → {corrected:.3} px, levels {:?}", arm.noise);
-        // Corners and robot alone are 0.15 to 0.2 px.
+        // The noise of corners and robot alone gives 0.15 to 0.2 px.
         assert!(corrected < 0.8 * reported && corrected < 0.3, "{mode:?}: {reported} → {corrected} px");
         let [before, after] = arm.heldout_px.expect("twenty views");
         assert!(after < before && !arm.contradicted, "{mode:?}: {before} → {after} px");
@@ -112,8 +112,8 @@ fn views_that_do_not_know_their_joints_have_no_arm() {
     assert!(fit.joint.expect("a joint estimate").arm.is_none());
 }
 
-/// What the examination says of views of an arm whose links are off by some millimetres, taken along rounds as a plan does, with the
-/// board slipped in the middle of the session.
+/// What the examination finds in views of an arm whose links are off by some millimetres, taken along rounds as a plan does, with
+/// the board slipped in the middle of the session.
 fn examined(mode: Mode, slip_m: f64) -> (Vec<FindingCode>, Calibration) {
     let links = OFF_LINKS.map(|row| row.map(|value| 4.0 * value));
     let mut setup = Setup { by_level: true, views: 30, ..with(mode, ArmError::Links(links), 7) };
@@ -138,7 +138,7 @@ fn what_the_errors_of_an_arm_explain_is_called_nothing_else_and_a_board_that_sli
         assert_eq!(*calibration.stated_uncertainty(), StatedUncertainty::AsModelled, "{mode:?}");
         let (found, calibration) = examined(mode, 1e-3);
         assert_eq!(found, [FindingCode::BoardMoved], "{mode:?}");
-        // What it moves is a part of what is stated; beside the errors of the arm it is less than the slip.
+        // What it moves is part of the stated error; next to the errors of the arm it is less than the slip.
         let (moved_m, error_m) = (calibration.moved_m().expect("it counts on no move"), calibration.tip_error_95_m());
         assert!(error_m.expect("stated") >= moved_m, "{mode:?}: {moved_m} of {error_m:?}");
         let point = calibration.joint.as_ref().expect("joint").reference_point;
@@ -147,7 +147,7 @@ fn what_the_errors_of_an_arm_explain_is_called_nothing_else_and_a_board_that_sli
     }
 }
 
-/// Whose target is larger than stated.
+/// A fit of views of a target that is larger than stated.
 fn larger(mode: Mode, by: f64, robot: [f64; 2]) -> Fit {
     let [robot_m, robot_rad] = robot;
     let mut setup = Setup { views: 20, ..with(mode, ArmError::None, 8) };
@@ -166,7 +166,7 @@ fn where_another_size_is_not_certain_the_errors_of_the_arm_count_that_it_may_be_
         };
         let (off, sigma) = of(&larger(mode, 0.013, [2e-5, 1e-4]));
         assert!(sigma < 0.1 * off, "{mode:?}: {off} ± {sigma}, the board is another one");
-        // As poses that are read in motion scatter.
+        // The scatter of poses that are read in motion.
         let (off, sigma) = of(&larger(mode, 0.03, [1e-3, 7e-3]));
         assert!(sigma > 0.5_f64.sqrt() * off, "{mode:?}: {off} ± {sigma}");
     }

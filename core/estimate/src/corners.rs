@@ -39,7 +39,7 @@ pub fn calibrate(
             let known = session.lens.known.map(|known| (known.intrinsics, known.information()));
             let prior = known.as_ref().map(|(expected, information)| LensPrior { expected: *expected, information });
             let refuted = session.refuted_lens(options, work)?;
-            // What is not so does not pull at the answer.
+            // A refuted prior must not pull the answer.
             let prior = prior.filter(|_| refuted.is_none());
             let refined = session.alone(prior, options, work)?;
             let mut fit = session.finish(refined, prior, work)?;
@@ -51,9 +51,9 @@ pub fn calibrate(
     }
 }
 
-/// What comes before the hand-eye transform.
+/// What is computed before the hand-eye transform.
 pub enum Prepared<'a> {
-    /// Without a robot that is all.
+    /// Without a robot the calibration ends here.
     Camera(Box<Fit>),
     /// All that the joint estimate begins with.
     HandEye(Box<Session<'a>>),
@@ -117,9 +117,9 @@ pub struct Session<'a> {
 
 /// What a joint estimate was made from.
 pub struct Fitted {
-    /// With the errors of its print, where they are shown.
+    /// The target's points, with print errors where the data show them.
     board: BoardPoints,
-    /// Those that are not outliers.
+    /// The views that are not outliers.
     views: Vec<View>,
 }
 
@@ -145,7 +145,8 @@ impl Session<'_> {
         refine::refine(&problem, &own, &self.lens, begin, options, work)
     }
 
-    /// Whether the views contradict what is known of the lens: as a prior it would pull noise levels along, and hide itself.
+    /// Whether the views contradict what is known of the lens: as a prior it would distort the noise levels and so hide the
+    /// contradiction.
     fn refuted_lens(&self, options: Options, work: &Work<'_>) -> Result<Option<RefutedLens>, CalibrateError> {
         let Some(known) = &self.lens.known else { return Ok(None) };
         match self.refine(None, options, work) {
@@ -156,7 +157,7 @@ impl Session<'_> {
         }
     }
 
-    /// The joint estimate of the session by itself, with what is known of its lens beforehand, and the error that may be stated.
+    /// The joint estimate of the session alone, with what is known of its lens beforehand, and the error that may be stated.
     pub fn alone(
         &self,
         prior: Option<LensPrior<'_>>,
@@ -238,7 +239,7 @@ fn renumber(
 /// How many times the typical residual of a view's own pose a view may have before its corners are taken as wrong: a target
 /// numbered wrongly or found in something else misses by whole squares.
 const WRONG_CORNERS: f64 = 8.0;
-/// Residuals below this, in pixels, are no sign of wrong corners however good the others are.
+/// Residuals below this, in pixels, do not indicate wrong corners, however good the others are.
 const FINE_PX: f64 = 1.0;
 
 /// The views whose corners make sense as an image of the target, those whose do not, and the camera by the former.
@@ -316,7 +317,7 @@ fn without_hand_eye(observations: &Observations, seen: &[DetectedView<'_>], lens
     }
 }
 
-/// Views and pose pairs of the robot; a view without a robot pose cannot stand in a set with a mode.
+/// Views and pose pairs of the robot; a view without a robot pose cannot be in a set with a mode.
 fn with_robot(
     mode: Mode,
     seen: &[DetectedView<'_>],
@@ -400,7 +401,7 @@ fn take_joint(
         let fit = screened.kept.binary_search(&i).ok().map(|place| &solution.views[place]);
         let pose = match fit {
             Some(fit) => fit.camera_from_target,
-            // Where the others expect it: that is what it does not fit.
+            // Where the other views expect it: the residuals then show what the view does not fit.
             None => camera_from_target(
                 problem.mode,
                 &solution.base_from_tip(&screened.views[i]),
@@ -411,7 +412,8 @@ fn take_joint(
         view.residuals = residuals(&solution.intrinsics, &pose, &points, corners);
         if let Some(distortion) = &refined.distortion {
             for residual in &mut view.residuals {
-                // It was taken off, and shifts a corner by too little to be another one where it was measured.
+                // It was subtracted before; the shift of a corner is too small to change its value at the measured
+                // place.
                 residual.px += distortion.field.at(&residual.px);
             }
         }

@@ -1,4 +1,5 @@
-//! Depths drawn pixel by pixel from the poses of the target, with errors that depth cameras have and the estimate's model has not.
+//! Depths drawn pixel by pixel from the poses of the target, with errors that depth cameras have and the estimate's model does
+//! not.
 
 use nalgebra::{Isometry3, Vector2, Vector3};
 use rand::SeedableRng as _;
@@ -87,7 +88,7 @@ fn error_m_of(t: &Session, found: &Fit) -> f64 {
     (there.isometry() * point - t.mount_from_camera.isometry() * point).norm()
 }
 
-/// By how much the depths of a camera are off, by place in the image (−1 … 1) and depth; drawn again for every image.
+/// Errors of the depths of a camera, by place in the image (−1 … 1) and depth; drawn again for every image.
 type Error = Box<dyn Fn(Vector2<f64>, f64) -> f64>;
 
 /// Makes one for every image.
@@ -95,7 +96,7 @@ type DepthCamera = dyn Fn(&mut ChaCha8Rng) -> Error;
 
 const SINGLE_DEPTHS_M: f64 = 3e-4;
 
-/// Of the sessions 1000 to 1059 those that leave out depths that are right.
+/// Sessions among 1000 to 1059 that leave out depths that are right.
 const LEFT_OUT: [u64; 2] = [1024, 1059];
 
 /// A camera whose depths are measured along its lens, with an offset of 5 mm and a scale of one part in a hundred.
@@ -145,14 +146,15 @@ fn depths_that_are_off_as_the_model_does_not_know_do_no_harm() {
     }
 }
 
-/// The errors that the depths of 20 views have, each found to what is stated of it, and none mistaken for another.
+/// The errors that the depths of 20 views have, each found within its stated uncertainty, and none mistaken for
+/// another.
 #[test]
 fn the_errors_of_a_depth_camera_are_found_to_what_is_stated() {
     let mut t = trial(Mode::EyeInHand, 20, &NOISE, camera(), 41);
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let turned = 0.5_f64.to_radians();
     for (view, board) in t.views.iter_mut().zip(&t.true_camera_from_target) {
-        // Of the pixel's own ray: a turn about the camera's y brings nearer what lies at positive x.
+        // The angle of the pixel's own ray counts: a turn about the camera's y brings nearer what is at positive x.
         let lens = t.intrinsics;
         let across = move |place: Vector2<f64>| (place.x * 320.0 + 320.0 - lens.cx) / lens.fx;
         let error = |place: Vector2<f64>, depth: f64| 0.005 + 0.01 * depth - turned * across(place) * depth;
@@ -172,7 +174,8 @@ fn the_errors_of_a_depth_camera_are_found_to_what_is_stated() {
     assert!(depths.in_fit.weight.turned && depths.in_fit.other_probability < 0.05, "{depths:?}");
 }
 
-/// Depths that are right make held-out predictions worse in some sessions, by chance: it shows what becomes of those that are left out.
+/// Depths that are right make held-out predictions worse in some sessions, by chance: it shows what happens to those that are left
+/// out.
 #[test]
 fn an_answer_that_leaves_the_depths_out_is_that_without_them() {
     let mut left_out = 0;
@@ -202,8 +205,8 @@ fn an_answer_that_leaves_the_depths_out_is_that_without_them() {
     assert!(left_out > 0, "all sessions count on their depths");
 }
 
-/// Drawn depths are exact but for the rounding of their numbers. The estimate counts them so; a verification, which looks for errors,
-/// counts them no better than depth cameras are.
+/// Drawn depths are exact except for the rounding of their numbers. The estimate treats them like that; a verification, which tests
+/// for errors, takes them as no better than those of depth cameras.
 #[test]
 fn a_verification_takes_no_depth_for_better_than_a_camera_resolves() {
     let mut t = trial(Mode::EyeInHand, VIEWS, &NOISE, camera(), 43);

@@ -1,4 +1,4 @@
-//! What an answer owes to a lens that is taken as exact.
+//! How an answer depends on a lens that is taken as exact.
 
 use nalgebra::{DVector, Matrix6};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
@@ -12,13 +12,13 @@ use handeye_geometry::observations::KnownLens;
 use handeye_geometry::point_error;
 use handeye_geometry::progress::CancelToken;
 
-/// How good a lens is of which nothing is said, pixels: programs that count pixels from the corner of the first one and from its middle
-/// differ by as much, and so do good calibrations of one camera.
+/// Accuracy of a lens of which none is stated, pixels: programs that count pixels from the corner of the first one and from its
+/// middle differ by as much, and so do good calibrations of one camera.
 const USUAL_PX: f64 = 0.5;
 
-/// What the expected error (95 %) of a point would be where [`JointSolution::reference_point`] is, if the lens were only known to half a
-/// pixel, see [`KnownLens`], metres: what that adds to the covariance at the noise levels of the answer, to first order, times what that
-/// is `widened` by. What the views themselves say of the lens counts. `None` where the lens is estimated.
+/// Expected error (95 %) at [`JointSolution::reference_point`] if the lens were only known to half a pixel, see [`KnownLens`],
+/// metres: what that adds to the covariance at the noise levels of the answer, to first order, times the factor `widened`. What the
+/// views themselves determine of the lens counts. `None` where the lens is estimated.
 ///
 /// # Errors
 /// [`HandEyeError::Cancelled`]; [`HandEyeError::NoSolution`] where the views do not determine the rest.
@@ -47,11 +47,11 @@ pub(crate) fn error_at_half_a_pixel_95_m(
     Ok(Some(solution.small_sample.radius_95(&of_point)))
 }
 
-/// Lenses that are as good as is said of them and are called another one.
+/// Part of the lenses that are as accurate as stated and are reported as another one.
 const FALSE_ALARM: f64 = 1e-3;
 
-/// Whether the views contradict what is said of a lens, by the lens that they show without it: the two are independent, and their
-/// difference has both covariances.
+/// Whether the views contradict what is stated about a lens, by the lens that they show without it: the two are independent, and
+/// their difference has both covariances.
 pub(crate) fn refuted(known: &KnownLens, by_views: &JointSolution) -> Option<RefutedLens> {
     let lens = by_views.lens_places();
     let parameters = by_views.intrinsics.parameters().into_iter().zip(known.intrinsics.parameters());

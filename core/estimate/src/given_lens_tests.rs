@@ -11,7 +11,7 @@ use crate::{CalibrateError, CameraKnowledge, Method, Noise, Observations};
 /// A robot that repeats well, as industrial ones do.
 const NOISE: Noise = Noise { corner_px: 0.1, robot_m: 2e-5, robot_rad: 1e-4, ..Noise::EXACT };
 
-/// Views of a camera of which this is said, and the true place of a point that it saw.
+/// The calibration by views of a camera with this knowledge, and the true place of a point that it saw.
 fn solved(mode: Mode, seed: u64, camera: impl Fn(Intrinsics) -> CameraKnowledge) -> (Calibration, f64) {
     let truth = session(&Setup { noise: NOISE, ..Setup::new(mode, 20, seed) });
     let observations = Observations { camera: camera(truth.intrinsics), ..truth.observations(false) };
@@ -49,7 +49,7 @@ fn the_error_of_a_lens_that_is_known_to_half_a_pixel_is_counted_and_the_views_ma
         // 17 or fewer of 20 come about by chance once in 40.
         assert!(within > 17, "{mode:?}: {within}");
         assert!(squares[0] < squares[1], "{mode:?}: {squares:?}");
-        // Of a Gaussian in space 95 % are within 1.6 (a ball) to 2 times (a line) of the RMS.
+        // For a Gaussian in space 95 % are within 1.6 (a ball) to 2 times (a line) of the RMS.
         assert!(squares[0] > stated / 9.0, "{mode:?}: {squares:?} {stated}");
     }
 }
@@ -83,7 +83,7 @@ fn a_lens_that_is_farther_off_than_is_said_of_it_is_named() {
     let joint = calibration.joint.as_ref().expect("joint");
     assert!(joint.known_lens.is_none() && !calibration.camera.expect("a lens").fixed, "the views alone say what it is");
     assert!(off_m <= calibration.tip_error_95_m().expect("stated"), "{off_m}");
-    // As firmly as it is said, and as gently.
+    // From an accuracy stated as firm to one stated as loose.
     for accuracy_px in [0.01, 0.1, 1.0] {
         let near = |lens| CameraKnowledge::Near(KnownLens { intrinsics: longer(lens), accuracy_px });
         let (calibration, _) = solved(Mode::EyeInHand, 71, near);

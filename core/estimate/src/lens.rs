@@ -1,4 +1,4 @@
-//! The camera, and the target's pose in every view that goes with it.
+//! The camera, and the target's pose in every view that belongs to it.
 
 use nalgebra::Vector2;
 
@@ -21,11 +21,11 @@ use handeye_geometry::view_equations::{ViewInput, Whitener};
 pub struct Lens {
     pub intrinsics: Intrinsics,
     pub free: bool,
-    /// The target as the corners show it; flat where the camera was given.
+    /// The shape of the target by the corners; flat where the camera was given.
     pub shape: BoardShape,
-    /// What is known of it beforehand beside the views, where it is free.
+    /// What is known of it in addition to the views, where it is free.
     pub known: Option<KnownLens>,
-    /// What the corners say of an estimated camera; `None` where it was given.
+    /// The fit of an estimated camera to the corners; `None` where it was given.
     pub fit: Option<CameraFit>,
     /// The pose of each view that fits its corners best.
     pub camera_from_target: Vec<Pose<Camera, Target>>,
@@ -37,7 +37,7 @@ pub struct Lens {
 }
 
 impl Lens {
-    /// The camera as it is known, or as all views together show it.
+    /// The camera as given, or as estimated from all views together.
     pub fn find(
         observations: &Observations,
         seen: &[DetectedView<'_>],
@@ -51,7 +51,7 @@ impl Lens {
                 if !LENS_ACCURACY_PX.contains(&known.accuracy_px) {
                     return Err(CalibrateError::LensAccuracy { accuracy_px: known.accuracy_px });
                 }
-                // The robot's motion is what tells more of it.
+                // Only the robot's motion gives more information on it.
                 let free = observations.mode.is_some();
                 Ok(Self { free, known: Some(known).filter(|_| free), ..given })
             }
@@ -127,8 +127,8 @@ impl Lens {
     }
 }
 
-/// A corner beyond a fold of the lens has no ray, or that of another corner. A fold farther out does no harm here; a
-/// finding names it.
+/// Fails where a fold of the lens is within the corners: a corner beyond it has no ray, or that of another corner. A
+/// fold farther out does no harm here; a finding names it.
 fn check_fold(intrinsics: &Intrinsics, seen: &[DetectedView<'_>]) -> Result<(), IntrinsicsError> {
     let Err(fold) = intrinsics.check_fold() else { return Ok(()) };
     let centre = Vector2::new(intrinsics.cx, intrinsics.cy);

@@ -96,7 +96,7 @@ fn of_solution(solution: &PoseGraphSolution) -> PoseFit {
 /// Where the estimate begins.
 struct Begin {
     solution: ClosedFormSolution,
-    /// Of the target poses; `None` when their unit is known.
+    /// Scale of the target poses; `None` when their unit is known.
     scale: Option<f64>,
 }
 

@@ -10,7 +10,7 @@ use handeye_geometry::testing::BOARD;
 use handeye_simulate::links::noise_twist;
 use handeye_simulate::session::{REALISTIC, camera, trial};
 
-/// Of a target pose per axis: a millimetre and a tenth of a degree.
+/// Noise of a target pose per axis: a millimetre and a tenth of a degree.
 const SEEN: (f64, f64) = (1e-3, 1.75e-3);
 
 /// A session of poses alone whose unit is a metre over `scale`, and the true hand-eye transform.
@@ -74,7 +74,7 @@ fn wrong_poses_are_left_out_and_the_answer_is_that_of_the_others() {
     }
 }
 
-/// One session in a thousand may lose a view: of 300 more than two do so in one run of two hundred and fifty.
+/// One session in a thousand may lose a view: of 300 sessions more than two do in one run of two hundred and fifty.
 #[test]
 fn healthy_sessions_keep_their_views() {
     let losing = |scale: f64, options: Options| {

@@ -1,4 +1,5 @@
-//! Where an arm stands and what its tool is, from joint angles and reported poses; and whether the two belong together.
+//! Where an arm is mounted and what its tool is, from joint angles and reported poses; and whether the two belong
+//! together.
 
 use nalgebra::Isometry3;
 
@@ -11,10 +12,10 @@ use handeye_geometry::frames::{Base, Pose, Tip};
 #[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum PlacementError {
-    /// The joint values are of no use.
+    /// The joint values are not usable.
     #[error(transparent)]
     Arm(#[from] ArmError),
-    /// An offset of a length, for which an estimate of the arm's errors has no place.
+    /// A length offset, which an estimate of the arm's errors does not model.
     #[error(
         "joint {joint} ({name}) is prismatic, and errors of an arm are estimated of revolute joints alone: calibrate without \
          the joint values of this arm"
@@ -22,13 +23,13 @@ pub enum PlacementError {
     PrismaticOffset {
         /// The joint, counted from 1.
         joint: usize,
-        /// What it is called.
+        /// Its name.
         name: String,
     },
-    /// The poses do not tell where the arm stands and what its tool is.
+    /// The poses do not determine where the arm is mounted and what its tool is.
     #[error("where the arm stands and where its tip is cannot be told from these poses: {0}")]
     NotPlaced(#[from] HandEyeError),
-    /// Angles and poses are not of one arm.
+    /// Angles and poses do not belong to one arm.
     #[error(
         "the joint angles do not belong to the poses: {off} of {views} views are off by more than {limit_mm} mm or \
          {limit_deg}°, most of all view {view}, by {distance_mm:.1} mm and {angle_deg:.2}°; check the order, unit, sign \
@@ -53,8 +54,8 @@ pub enum PlacementError {
 }
 
 /// How far a reported tip may be from the one that its joint angles give, metres. A controller with the factory's own
-/// calibration is some millimetres from the nominal arm; an error in the columns is centimetres and more. At half a
-/// metre of reach it is 2 % of the twists, and an estimated offset is then 2 % off.
+/// calibration differs by some millimetres from the nominal arm; an error in the columns is centimetres and more. At
+/// half a metre of reach it is 2 % of the twists, and an estimated offset is then 2 % off.
 pub const DISTANCE_LIMIT_M: f64 = 0.010;
 /// The same for the rotation, radians.
 pub const ROTATION_LIMIT_RAD: f64 = 1.0 * std::f64::consts::PI / 180.0;
@@ -64,31 +65,31 @@ const ROUNDED_M: f64 = 1e-4;
 /// The same for the rotation, radians: to a hundredth of a degree.
 const ROUNDED_RAD: f64 = 0.01 * std::f64::consts::PI / 180.0;
 
-/// The robot in one view: the reported pose of the tip, and the joint values in radians (of a prismatic joint in metres).
+/// The robot in one view: the reported pose of the tip, and the joint values in radians (metres for a prismatic joint).
 #[derive(Debug, Clone, Copy)]
 pub struct JointView<'a> {
     /// Tip pose as the controller reported it.
     pub base_from_tip: Pose<Base, Tip>,
-    /// Joint values as the controller reported them: radians, of a prismatic joint metres.
+    /// Joint values as the controller reported them: radians, or metres for a prismatic joint.
     pub joints_rad: &'a [f64],
 }
 
 /// The joints at the tip, view by view, see [`Arm::tip_from_joints`].
 pub type TipFromJoints = Vec<Vec<Isometry3<f64>>>;
 
-/// An arm put where the poses say that it stands.
+/// An arm at the place that the poses determine.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Placement {
     /// The arm with `base_from_first` and `flange_from_tip` of the poses.
     pub arm: Arm,
-    /// Distance in metres and angle in radians between reported tip and that of the joint angles, per view.
+    /// Distance in metres and angle in radians between the reported tip and that by the joint angles, per view.
     pub misses: Vec<(f64, f64)>,
 }
 
 /// An arm, its tool, and its joints in the views of a calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmOfViews {
-    /// Where the views put it, and how far from them.
+    /// Its place by the views, and the remaining distances.
     pub placement: Placement,
     /// Where the tip of its tool is in the frame of the tip, metres.
     pub tool_m: [f64; 3],
@@ -108,8 +109,8 @@ impl Placement {
         self.joints_of(view)
     }
 
-    /// The joints at the tip, for an estimate of the arm's errors. That knows zeros that are angles: the offset of a length has no
-    /// place in it, and one in radians would be wrong without anybody seeing it.
+    /// The joints at the tip, for an estimate of the arm's errors. It models zeros as angles: a length offset has no place in it,
+    /// and one in radians would be wrong without being noticed.
     fn joints_of(&self, view: &JointView<'_>) -> Result<Vec<Isometry3<f64>>, PlacementError> {
         let joints = self.arm.joints();
         if let Some(i) = joints.iter().position(|joint| joint.kind == JointKind::Prismatic) {
@@ -118,8 +119,8 @@ impl Placement {
         Ok(self.arm.tip_from_joints(&view.base_from_tip, view.joints_rad)?)
     }
 
-    /// The arm, where the reported poses are those of its own chain; `None` where the controller counts with another one, such as its
-    /// factory calibration. Errors that are found beside reported poses are then not those of this chain.
+    /// The arm, where the reported poses are those of its own chain; `None` where the controller uses another one, such as its
+    /// factory calibration. Errors that are found relative to reported poses are then not those of this chain.
     pub fn arm_of_poses(&self) -> Option<&Arm> {
         let count = self.misses.len().max(1) as f64;
         let rms_rad = (self.misses.iter().map(|miss| miss.1 * miss.1).sum::<f64>() / count).sqrt();
@@ -137,7 +138,7 @@ impl Placement {
     /// # Errors
     /// [`PlacementError::Foreign`] names the view that is off most.
     pub(crate) fn check(&self) -> Result<(), PlacementError> {
-        // In units of the limits, so that both count; NaN is off.
+        // In units of the limits, so that both count; NaN exceeds them.
         let excess = |miss: &(f64, f64)| (miss.0 / DISTANCE_LIMIT_M).max(miss.1 / ROTATION_LIMIT_RAD);
         let is_off = |miss: &&(f64, f64)| !(0.0..=1.0).contains(&excess(miss));
         let off = self.misses.iter().filter(is_off).count();
@@ -157,18 +158,19 @@ impl Placement {
     }
 }
 
-/// Finds where the arm stands and where its tip is: `base_from_first` and `flange_from_tip` with
-/// `base_from_tip_i = base_from_first · chain(q_i) · flange_from_tip`, whatever `arm` has for them.
+/// Finds where the arm is mounted and where its tip is: `base_from_first` and `flange_from_tip` with `base_from_tip_i =
+/// base_from_first · chain(q_i) · flange_from_tip`, whatever `arm` has for them.
 ///
 /// This is robot-world calibration, `A X = Z B`, with the chain in the place of the camera; poses that are rounded to a
-/// tenth of a millimetre place the arm as well. A constant error of the first or the last joint goes into the answer.
+/// tenth of a millimetre place the arm equally well. A constant error of the first or the last joint goes into the
+/// answer.
 ///
 /// # Needs
 /// Three views with rotations about two axes.
 ///
 /// # Errors
-/// [`ArmError::WrongCount`], [`ArmError::NotFinite`]; [`PlacementError::NotPlaced`] when the poses do not determine it. That
-/// the answer does not fit is for [`Placement::check`].
+/// [`ArmError::WrongCount`], [`ArmError::NotFinite`]; [`PlacementError::NotPlaced`] when the poses do not determine it.
+/// Whether the answer fits is checked by [`Placement::check`].
 pub fn place(arm: &Arm, views: &[JointView<'_>]) -> Result<Placement, PlacementError> {
     let bare = arm.clone().mounted(nalgebra::Isometry3::identity(), nalgebra::Isometry3::identity());
     let first_from_flange = views.iter().map(|view| bare.forward(view.joints_rad)).collect::<Result<Vec<_>, _>>()?;
@@ -176,7 +178,7 @@ pub fn place(arm: &Arm, views: &[JointView<'_>]) -> Result<Placement, PlacementE
         .iter()
         .zip(&first_from_flange)
         // H = Z F T reads as F⁻¹ = T H⁻¹ Z: the flange sees the arm's foot as a camera, on the tip at T⁻¹, sees a target
-        // that stands in the base at Z.
+        // that is in the base at Z.
         .map(|(view, pose)| PosePair {
             anchor_from_mount: view.base_from_tip.relabel(),
             camera_from_target: pose.inverse().relabel(),
@@ -195,12 +197,12 @@ pub fn place(arm: &Arm, views: &[JointView<'_>]) -> Result<Placement, PlacementE
     Ok(Placement { arm: bare.mounted(base_from_first, flange_from_tip), misses })
 }
 
-/// Finds where the arm stands, see [`place`], checks that joint angles and poses belong together, and says where its
-/// joints are at the tip in every view, see [`Arm::tip_from_joints`].
+/// Finds where the arm is mounted, see [`place`], checks that joint angles and poses belong together, and gives the
+/// joints relative to the tip in every view, see [`Arm::tip_from_joints`].
 ///
 /// # Errors
-/// Those of [`place`], [`PlacementError::Foreign`], and [`PlacementError::PrismaticOffset`]: an estimate of the arm's errors, which is
-/// what the frames are for, knows revolute joints alone.
+/// Those of [`place`], [`PlacementError::Foreign`], and [`PlacementError::PrismaticOffset`]: an estimate of the arm's errors, which
+/// needs these frames, supports revolute joints only.
 pub fn place_checked(arm: &Arm, views: &[JointView<'_>]) -> Result<(Placement, TipFromJoints), PlacementError> {
     let placement = place(arm, views)?;
     placement.check()?;

@@ -13,7 +13,7 @@ fn model_ur5() -> Arm {
     ArmModel::Kind(ArmKind::Ur5Coppeliasim).arm().expect("built in")
 }
 
-/// An arm on a table with a tool, neither of which is at the origin of anything.
+/// An arm on a table with a tool, neither of which is at an origin.
 fn mounted() -> Arm {
     let foot = se3::exp(&Vector6::new(0.4, -0.2, 0.7, 0.3, -0.2, 1.1));
     let tool = se3::exp(&Vector6::new(0.01, 0.03, 0.12, -0.4, 0.2, 0.5));

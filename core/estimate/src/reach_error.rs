@@ -1,21 +1,21 @@
-//! How near a tool arrives at a point that the camera saw: by the controller as it is, and by corrected commands.
+//! How near a tool arrives at a point that the camera saw: by the uncorrected controller, and by corrected commands.
 //!
 //! # What it estimates
 //! The distance between a point of the target, seen by the camera from a pose of the session, and the tip of a tool that is sent
-//! there: its 95 % quantile over the views, over points of the target, over directions of the tool and over what is not known of
-//! arm and camera. The tool is sent against the target's normal with the camera on the arm, along the mean axis of the tip with the
-//! camera beside it, tilted by up to 15° with any turn about itself. The place of its tip behind the flange is what the same arm finds
-//! by turning about one point, as people do.
+//! there: its 95 % quantile over the views, over points of the target, over directions of the tool and over the uncertainty of arm
+//! and camera. The tool is sent against the target's normal with the camera on the arm, along the mean axis of the tip with the
+//! camera next to it, tilted by up to 15° with any turn about its axis. The TCP is what the same arm finds by turning about one
+//! point, as is usual in practice.
 //!
 //! # How
-//! Errors of the arm and both transforms are drawn from their joint posterior; every draw is an arm that the data allow. What is
-//! commanded does not depend on the draw, so the inverse kinematics is solved once for each touch, and a tool that is found a
+//! Errors of the arm and both transforms are drawn from their joint posterior; every draw is an arm that the data allow. The
+//! command does not depend on the draw, so the inverse kinematics is solved once for each touch, and a tool that is found a
 //! little elsewhere is counted to first order. The draws are the same in every run.
 //!
 //! # Degenerate cases
-//! Touches out of reach of the arm are left out; with fewer than a quarter of them left nothing is stated. Where the controller counts
-//! with another chain than the one that is known, the errors are those beside what it reports, and no commands are corrected by them:
-//! the error with corrected commands is not stated then.
+//! Touches out of reach of the arm are left out; with fewer than a quarter of them left nothing is stated. Where the controller
+//! uses another chain than the one that is known, the errors are relative to the poses that it reports, and no commands are
+//! corrected by them: the error with corrected commands is not stated then.
 
 use nalgebra::{
     Cholesky, DMatrix, DVector, Isometry3, Matrix3, Matrix3x6, Matrix6, Point3, UnitQuaternion, Vector3, Vector6,
@@ -32,28 +32,28 @@ use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_geometry::se3;
 use handeye_geometry::targets::TargetSpec;
 
-/// Touches of a session. The error of commands as they are is almost the same in every draw, so that its quantile is one over the
+/// Touches of a session. The error of uncorrected commands is almost the same in every draw, so that its quantile is one over the
 /// touches, which is too small over a few: of 24 the 23rd has 23 of 25 below it in the mean, of these the 92nd has 92 of 97.
 const TOUCHES: usize = 96;
 /// Draws of arm and camera.
 pub(crate) const DRAWS: usize = 100;
-/// Every touch is judged by one in so many draws.
+/// Every touch is evaluated with one in this many draws.
 pub(crate) const APART: usize = 4;
 /// Poses in which the tip of the tool is found.
 const PIVOTS: usize = 8;
-/// Distance in metres and angle in radians at which a touch has arrived: far below what it misses by.
+/// Distance in metres and angle in radians at which a touch has arrived: far below its error.
 const ARRIVED: f64 = 1e-7;
-/// Tilt of the tool at the most, radians.
+/// Largest tilt of the tool, radians.
 const TILT_RAD: f64 = 15.0 * std::f64::consts::PI / 180.0;
-/// Share of errors within what is stated.
+/// Share of errors within the stated one.
 const LEVEL: f64 = 0.95;
-/// Step of differences: metres and radians, of functions that turn over lengths of a metre.
+/// Step of differences: metres and radians, of functions that vary over lengths of a metre.
 const STEP: f64 = 1e-6;
-/// Of the draws: the same in every run.
+/// Seed of the draws: the same in every run.
 pub(crate) const SEED: u64 = 0x72_6561_6368;
 const TOUCH_SEED: u64 = 0x74_6f75_6368;
 
-/// Length of a tool that nobody has named, metres.
+/// Length of a tool where none is stated, metres.
 pub const USUAL_TOOL_M: f64 = 0.1;
 /// The tip of that tool in the frame of the tip: along z.
 pub const USUAL_TOOL: [f64; 3] = [0.0, 0.0, USUAL_TOOL_M];
@@ -67,23 +67,23 @@ pub struct Seen {
     pub camera_from_target: Pose<Camera, Target>,
 }
 
-/// Distances that a touch stays under with a probability of 95 %, metres.
+/// Distances that a touch stays below with a probability of 95 %, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReachErrors {
-    /// By reported poses, the transform that goes with them, and commands as they are.
+    /// With reported poses, their transform, and uncorrected commands.
     pub as_it_is_95_m: f64,
-    /// By corrected poses and commands; `None` where no commands are corrected.
+    /// With corrected poses and commands; `None` where no commands are corrected.
     pub corrected_95_m: Option<f64>,
-    /// The part of the first that no view lowers: what the arm is off by its most probable errors, and does not repeat; or what follows
-    /// from the stated accuracy of the robot.
+    /// The part of the first that no view lowers: the effect of the most probable errors of the arm and of its repeatability; or
+    /// what follows from the stated accuracy of the robot.
     pub as_it_is_least_95_m: f64,
-    /// The part of the error by corrected poses that no view lowers: what the arm does not repeat, at the view, at the touch and where the
-    /// tool is found; `None` where of the arm no more is known than how accurate it is.
+    /// The part of the error by corrected poses that no view lowers: the repeatability of the arm, at the view, at the touch and
+    /// where the tool is found; `None` where only the accuracy of the arm is known.
     pub repeatability_95_m: Option<f64>,
 }
 
 impl ReachErrors {
-    /// Of an answer that something else moves as far, metres.
+    /// The errors of an answer that something else moves this far, metres.
     #[must_use]
     pub(crate) fn moved_by(self, moved_m: f64) -> Self {
         Self {
@@ -105,23 +105,23 @@ impl ReachErrors {
     }
 }
 
-/// One way of going about it: by reported poses, or by corrected ones.
+/// One way to reach a point: by reported poses, or by corrected ones.
 #[derive(Debug, Clone)]
 struct Way {
     hand_eye: HandEye,
-    /// The arm as the way takes it to be: without errors where it is by reported poses.
+    /// The arm as modelled by this way: without errors if by reported poses.
     arm: CorrectedArm,
     /// The mean z axis of the tip over the views, in the base.
     axis: Vector3<f64>,
 }
 
-/// A touch by one way.
+/// A touch in one of the two ways.
 struct Touch {
     /// Joint values of the view and of the command.
     view: At,
     command: At,
     in_camera: Point3<f64>,
-    /// Turn of the tip in the base as the way takes it to be.
+    /// Turn of the tip in the base as modelled by this way.
     turn: UnitQuaternion<f64>,
 }
 
@@ -143,27 +143,27 @@ impl At {
     }
 }
 
-/// How near a tool arrives by a calibration of an arm that is known, wherever the camera sees.
+/// How near a tool arrives by a calibration of an arm that is known, at any point that the camera sees.
 #[derive(Debug, Clone)]
 pub struct Reach {
     as_it_is: Way,
     corrected: Way,
     views: Vec<Seen>,
-    /// How the tip is turned in them, as reported.
+    /// Orientations of the tip in them, as reported.
     turned: Vec<UnitQuaternion<f64>>,
     tool: Vector3<f64>,
     /// Turns about one point by which the tool is found.
     turns: [UnitQuaternion<f64>; PIVOTS],
     /// Arms and cameras that the data allow.
     possible: Vec<Possible>,
-    /// The most probable arm and camera, with what the arm does not repeat in each of them.
+    /// The most probable arm and camera, with a draw of the arm's repeatability error in each of them.
     repeated: Vec<Possible>,
     /// Whether commands are corrected.
     is_corrected: bool,
     target: TargetSpec,
 }
 
-/// Which points are touched, from which view, and how the tool is turned against the target.
+/// Which points are touched, from which view, and the orientation of the tool relative to the target.
 pub(crate) struct Plan {
     pub view: usize,
     pub in_camera: Point3<f64>,
@@ -171,9 +171,9 @@ pub(crate) struct Plan {
 }
 
 impl Reach {
-    /// Of a session whose arm is known; `answer` is the calibration by reported poses, `tool` where the tip of the tool is in the frame
-    /// of the tip, metres, and `is_corrected` whether commands can be corrected, as is so where the reported poses are those of the
-    /// chain. `None` without views, and for a covariance that is none.
+    /// The reach of a session whose arm is known; `answer` is the calibration by reported poses, `tool` where the tip of the tool
+    /// is in the frame of the tip, metres, and `is_corrected` whether commands can be corrected, which is possible where the
+    /// reported poses are those of the chain. `None` without views, and for a covariance that is not valid.
     pub(crate) fn new(
         (arm, fit): (&CorrectedArm, &ArmFit),
         answer: &HandEye,
@@ -204,7 +204,7 @@ impl Reach {
         })
     }
 
-    /// At points of the target where it was seen; `None` where too few touches are in reach.
+    /// Errors at points of the target where it was seen; `None` where too few touches are in reach.
     pub(crate) fn at_target(&self) -> Option<ReachErrors> {
         let points = self.target.points();
         let seen = |view: usize, random: &mut Draw| {
@@ -213,15 +213,16 @@ impl Reach {
         if points.is_empty() { None } else { self.errors(seen) }
     }
 
-    /// At points in the coordinates of a camera beside the arm, metres: the largest of the errors of those that are in reach. `None` where
-    /// none is, and with a camera on the arm, from whose views a point of the camera is in as many places.
+    /// Errors at points in the coordinates of a camera next to the robot, metres: the largest of the errors of those that are in
+    /// reach. `None` where none of them is, and with a camera on the arm, for which a point in the camera is at a different place
+    /// in each view.
     pub(crate) fn at_points(&self, in_camera: &[Point3<f64>]) -> Option<ReachErrors> {
         let points = in_camera.iter().filter(|_| self.stands_still());
         points.filter_map(|point| self.errors(|_, _| *point)).reduce(ReachErrors::worse)
     }
 
-    /// The joints at the tip where the arm stands with it there, see [`Arm::tip_from_joints`], as in the view that is nearest; `None` where
-    /// the arm does not get there from that view.
+    /// The joints relative to the tip with the tip there, see [`Arm::tip_from_joints`], in the configuration of the nearest view;
+    /// `None` where the arm does not get there from that view.
     pub fn tip_from_joints(&self, base_from_tip: &Pose<Base, Tip>) -> Option<Vec<Isometry3<f64>>> {
         let arm = &self.as_it_is.arm.arm;
         let there = base_from_tip.rotation();
@@ -231,7 +232,7 @@ impl Reach {
         arm.tip_from_joints(base_from_tip, &joints_rad).ok()
     }
 
-    /// Whether the camera is beside the arm.
+    /// Whether the camera is next to the robot (eye to hand).
     pub(crate) fn stands_still(&self) -> bool {
         self.corrected.hand_eye.mode() == Mode::EyeToHand
     }
@@ -254,9 +255,10 @@ impl Reach {
         })
     }
 
-    /// How the miss of a touch by corrected commands turns with what is not known: the mean over touches of `Jᵀ J`, with `J` the
+    /// Sensitivity of the miss of a touch by corrected commands to what is not known: the mean over touches of `Jᵀ J`, with `J` the
     /// derivatives of the vector from the point to the tip of the tool by `[mount_from_camera (6), errors of the arm]`, metres and
-    /// radians, the errors in the order of [`ArmErrors::numbers`]. Of touches at the target, or at points in camera coordinates. `None` where too few touches are in reach.
+    /// radians, the errors in the order of [`ArmErrors::numbers`]. For touches at the target, or at points in camera coordinates.
+    /// `None` where too few touches are in reach.
     pub(crate) fn weight(&self, in_camera: Option<&[Point3<f64>]>) -> Option<DMatrix<f64>> {
         let target = self.target.points();
         if in_camera.map_or(target.is_empty(), <[Point3<f64>]>::is_empty) {
@@ -304,7 +306,7 @@ impl Reach {
         (4 * touches.len() >= planned.len()).then_some(touches)
     }
 
-    /// The quantile of the distances by a way where the truth is one of these.
+    /// The quantile of the distances in one way where the truth is one of these.
     fn quantile(&self, way: &Way, touches: &[Touch], truths: &[Possible]) -> Option<f64> {
         let pivots = way.pivots(&touches[0], &self.turns, &self.views, &self.tool);
         let mut distances: Vec<f64> = Vec::with_capacity(truths.len() * touches.len());
@@ -330,7 +332,7 @@ impl Way {
         Some(Touch { view, command: self.at(&goal, &seen.joints_rad)?, in_camera, turn })
     }
 
-    /// The arm commanded to a goal as the way takes it to be.
+    /// The arm commanded to a goal as modelled by this way.
     fn at(&self, goal: &Isometry3<f64>, near: &[f64]) -> Option<At> {
         At::new(&self.arm.arm, &self.arm.joints_for(&Pose::from_isometry(*goal), near, ARRIVED).ok()?)
     }
@@ -353,9 +355,9 @@ impl Way {
         turns.iter().filter_map(at).collect()
     }
 
-    /// Where the way finds the tip of the tool in the frame of its tip, when the arm is as in `truth` and turns about one point: with
-    /// `l_k` the tip of the tool as it is at turn `R_k`, the place `t` and the shift `s` of the point for which all `R_k (t − l_k) − s` are
-    /// least. Where the arm reaches too few turns it is where it is.
+    /// Where this way finds the tip of the tool in the frame of its tip, when the arm is as in `truth` and turns about one point:
+    /// with `l_k` the tip of the tool as it is at turn `R_k`, the place `t` and the shift `s` of the point for which all
+    /// `R_k (t − l_k) − s` are least. Where the arm reaches too few turns, the true place is returned.
     fn tool_by(
         &self,
         pivots: &[(At, UnitQuaternion<f64>)],
@@ -376,17 +378,17 @@ impl Way {
         Some(Cholesky::new(information)?.solve(&right).fixed_rows::<3>(0).into_owned())
     }
 
-    /// From the point to the tip of the tool.
+    /// Vector from the point to the tip of the tool.
     fn miss(touch: &Touch, draw: &Possible, tool: &Vector3<f64>, found: &Vector3<f64>) -> Vector3<f64> {
         let at_view = touch.view.tip(&draw.errors) * draw.unexplained.view;
         let point = camera(&draw.hand_eye, &at_view) * touch.in_camera;
         let tip = touch.command.tip(&draw.errors) * draw.unexplained.touch * Point3::from(*tool);
-        // The command was for the tool as it is.
+        // The command was for the true tool.
         tip - point - touch.turn * (found - tool)
     }
 }
 
-/// Touches that are spread evenly over the views; `point` is where in the camera one of a view is.
+/// Touches that are spread evenly over the views; `point` is the place of one in the camera, by the view.
 pub(crate) fn planned(views: usize, point: impl Fn(usize, &mut Draw) -> Point3<f64>) -> Vec<Plan> {
     let mut random = Draw::new(TOUCH_SEED);
     let plan = |k: usize| {
@@ -406,7 +408,7 @@ pub(crate) fn turns(random: &mut Draw) -> [UnitQuaternion<f64>; PIVOTS] {
     std::array::from_fn(|_| UnitQuaternion::from_scaled_axis(Vector3::from_fn(|_, _| random.even() - 0.5)))
 }
 
-/// The distance that 95 % of these stay under.
+/// The distance that 95 % of these stay below.
 pub(crate) fn quantile(mut distances: Vec<f64>) -> Option<f64> {
     distances.sort_by(f64::total_cmp);
     let last = distances.len().checked_sub(1)?;
@@ -442,12 +444,12 @@ impl Unexplained {
     }
 }
 
-/// Drawn from what a fit leaves open; `None` for a covariance that is none.
+/// Drawn from the posterior of a fit; `None` for a covariance that is not valid.
 fn possible(fit: &ArmFit, random: &mut Draw) -> Option<Vec<Possible>> {
     let covariance = fit.links_and_errors_covariance();
     let count = covariance.nrows();
     let root = Cholesky::new(covariance)?.l();
-    // As good as infinite.
+    // Practically infinite.
     let freedom = fit.small_sample.degrees_of_freedom.min(1e4);
     let law = ChiSquared::new(freedom).ok()?;
     let mut drawn = Vec::with_capacity(DRAWS);
@@ -477,7 +479,7 @@ fn mean_axis(arm: &Arm, views: &[Seen]) -> Option<Vector3<f64>> {
     axes.sum::<Vector3<f64>>().try_normalize(1e-9)
 }
 
-/// Where the camera is when the tip is there.
+/// Pose of the camera with the tip at a pose.
 pub(crate) fn camera(hand_eye: &HandEye, base_from_tip: &Isometry3<f64>) -> Isometry3<f64> {
     match hand_eye {
         HandEye::EyeInHand { tip_from_camera, .. } => base_from_tip * tip_from_camera.isometry(),
@@ -485,7 +487,7 @@ pub(crate) fn camera(hand_eye: &HandEye, base_from_tip: &Isometry3<f64>) -> Isom
     }
 }
 
-/// How a tool is turned that touches straight: against the target's normal, or with a camera beside the arm along the mean `axis` of the
+/// Orientation of a tool without tilt: against the target's normal, or with a camera next to the robot along the mean `axis` of the
 /// tip.
 pub(crate) fn along(
     mode: Mode,
@@ -494,13 +496,14 @@ pub(crate) fn along(
     axis: &Vector3<f64>,
 ) -> UnitQuaternion<f64> {
     match mode {
-        // A target's z axis points away from who looks at it.
+        // A target's z axis points away from the viewer.
         Mode::EyeInHand => base_from_camera.rotation * camera_from_target.isometry().rotation,
         Mode::EyeToHand => facing(axis),
     }
 }
 
-/// How the distance to the point about which a tool turns depends on the place of its tip and on the shift of that point.
+/// Derivatives of the distance to the point about which a tool turns by the place of its tip and on the shift of that
+/// point.
 pub(crate) fn pivot_row(turn: &UnitQuaternion<f64>) -> Matrix3x6<f64> {
     let mut row = Matrix3x6::zeros();
     row.fixed_columns_mut::<3>(0).copy_from(turn.to_rotation_matrix().matrix());

@@ -61,7 +61,7 @@ fn at_points_it_is_that_of_the_worst_and_the_arm_repeats_as_its_noise_says() {
     let nowhere = Point3::new(0.0, 0.0, 50.0);
     assert_eq!(reach.at_points(&[points[0], nowhere]), Some(one), "the arm does not get to the other");
     assert_eq!(reach.at_points(&[nowhere]), None);
-    // The camera stands still, so it is the noise of the touch alone: 2.8 σ of a 3-D vector, with 0.1 m of tool.
+    // The camera does not move, so it is the noise of the touch alone: 2.8 σ of a 3-D vector, with 0.1 m of tool.
     let noise = found.joint.as_ref().and_then(|joint| joint.arm.as_ref()).expect("an arm").noise;
     let sigma_m = noise.robot_m.hypot(noise.robot_rad * USUAL_TOOL_M);
     let repeatability_95_m = one.repeatability_95_m.expect("by its noise");

@@ -33,13 +33,13 @@ use handeye_geometry::targets::observation::{Corners, View};
 pub struct Refined {
     pub screened: Screened,
     pub weights: Option<CornerWeights>,
-    /// What an attempt at the depths of the views gave; `None` when there was none.
+    /// Result of an attempt to use the depths of the views; `None` when there was none.
     pub depths: Option<DepthsInFit>,
     /// What the other model of the depth camera adds, where the answer uses its depths.
     pub other_depths: Option<OtherModel>,
-    /// What the points of the target are off their drawing, where the data show it.
+    /// Print errors of the target's points, where the data show them.
     pub print: Option<PrintErrors>,
-    /// What the lens does beyond its model, where the data show it; it is taken off the corners of the views.
+    /// Residual distortion of the lens, where the data show it; it is subtracted from the corners of the views.
     pub distortion: Option<ShownDistortion>,
 }
 
@@ -56,7 +56,7 @@ pub fn start(
     let problem = &JointProblem { views: &sampled, ..*problem };
     let turns = Turns::of(target);
     let misfit = |solution: &ClosedFormSolution, view: usize, quarters: usize| {
-        // The corners are as they were detected: it is the target that is turned the other way.
+        // The corners stay as detected: the target is turned the other way instead.
         let anchor_from_target = turns.turned(&solution.anchor_from_target, 4 - quarters);
         let solution = ClosedFormSolution { anchor_from_target, ..*solution };
         squared_residuals(problem, (&lens.intrinsics, &lens.shape), &solution, &problem.views[view], CAP_PX).sqrt()
@@ -70,7 +70,7 @@ pub fn start(
     })
 }
 
-/// The view with a handful of corners spread over the target: enough to tell a good start from a bad one.
+/// The view with a handful of corners spread over the target: enough to distinguish a good start from a bad one.
 fn sampled(view: &View) -> View {
     const CORNERS: usize = 6;
     let count = view.corners.len();
@@ -92,7 +92,7 @@ pub fn refine(
     work: &Work<'_>,
 ) -> Result<Refined, CalibrateError> {
     let weights = CornerWeights::stated(problem.views.iter().flat_map(|view| &view.corners));
-    // What the corners say without the robot they say with it, and the start is then near the answer.
+    // What the corners show without the robot holds with it, and the start is then near the answer.
     let warp = lens.is_bent();
     let free = Free { intrinsics: lens.free, warp, scale: options.free_scale, ..Free::default() };
     let problem = JointProblem { free, weights, ..*problem };
@@ -108,7 +108,7 @@ pub fn refine(
     } else {
         estimate_screened(&problem, &start, own, *work)?
     };
-    // What the model did not know of makes views look wrong, so they are judged again once it does.
+    // Unmodelled effects make views look wrong, so they are judged again once the model includes them.
     let again = |problem: &JointProblem<'_>, solution: JointSolution, screened: Screened| {
         if options.keep_outliers {
             return Ok(Screened { solution, ..screened });
@@ -133,8 +133,8 @@ pub fn refine(
 }
 
 impl Refined {
-    /// Made again from where it ended, with the same views, unknowns and kinds of noise: `problem` is of those views. The
-    /// error that may be stated is that of [`Self::stated`].
+    /// The estimate repeated from where it ended, with the same views, unknowns and kinds of noise: `problem` is of those
+    /// views. The error that may be stated is that of [`Self::stated`].
     pub fn again(&self, problem: &JointProblem<'_>, work: &Work<'_>) -> Result<Self, HandEyeError> {
         let mut next = self.clone();
         let view_noise = Some(self.screened.solution.noise.view_px > 0.0);
@@ -143,7 +143,7 @@ impl Refined {
         Ok(next)
     }
 
-    /// The same with what the lens does beyond its model, where the data show it; `problem` is of the views in the fit.
+    /// The same with the residual distortion of the lens, where the data show it; `problem` is of the views in the fit.
     pub fn with_distortion(mut self, problem: &JointProblem<'_>, work: &Work<'_>) -> Result<Self, HandEyeError> {
         let shown = with_shown_distortion(problem, &self.screened.solution, work.cancel)?;
         if let Some((distortion, solution)) = shown {
@@ -181,7 +181,7 @@ impl Refined {
         self.print.as_ref().map_or_else(|| drawn.clone(), |print| print.on(drawn))
     }
 
-    /// The same with the error that may be stated: that of a session by itself, if its lens does more than its model.
+    /// The same with the error that may be stated: that of a single session, if its lens has a residual distortion.
     pub fn stated(mut self, problem: &JointProblem<'_>, work: &Work<'_>) -> Result<Self, HandEyeError> {
         let mut solution = joint::with_stated_error(problem, self.screened.solution.clone(), work.cancel)?;
         if let Some(other) = &self.other_depths {
@@ -228,9 +228,9 @@ fn bent(
         return Ok(None);
     }
     let start = flat.as_start();
-    // A target seen square on says nothing of its shape.
+    // A target seen square on does not determine its shape.
     let Some(solution) = determined(joint::fit(&with_warp, &start, work.cancel))? else { return Ok(None) };
-    // What estimated noise levels and a curved cost do to the covariance makes it larger.
+    // Estimated noise levels and a curved cost make the covariance larger.
     let fitted = joint::warp_ratio(&with_warp, &solution, work.cancel)?;
     if !fitted.is_some_and(may_be_shown) {
         return Ok(None);
@@ -238,7 +238,7 @@ fn bent(
     let stated = joint::with_stated_error(&with_warp, solution, work.cancel);
     let Some(mut solution) = determined(stated)? else { return Ok(None) };
     if let Some(print) = print {
-        // What the print is not known to is not known of the bend either.
+        // The uncertainty of the print errors is one of the bend, too.
         solution = print_errors::with_its_error(&with_warp, solution, print, work.cancel)?.0;
     }
     let Some(covariance) = solution.warp_covariance() else { return Ok(None) };
@@ -254,8 +254,8 @@ fn bent(
 
 /// The print errors that the views of a screened estimate show, and the estimate with them. `problem` has the target as drawn.
 ///
-/// Errors that are smooth over the image are smooth over a target that is always seen alike, and the other way round. What explains
-/// more goes first: where that is the lens, the print is what its residual distortion leaves.
+/// Errors that are smooth over the image are smooth over a target that is always seen the same way, and vice versa. What explains
+/// more goes first: where that is the lens, print errors are what its residual distortion leaves.
 fn printed(
     problem: &JointProblem<'_>,
     screened: &Screened,
@@ -276,15 +276,15 @@ fn printed(
     let of_undistorted = JointProblem { views: &undistorted, ..problem };
     let Some(shown) = with_shown_print(&of_undistorted, &distorted, work.cancel)? else { return Ok(None) };
     let (print, solution) = on_flat_target(&of_undistorted, &distorted, shown, work)?;
-    // The distortion is found again once all else is; until then the corners are as they were measured.
+    // The distortion is found again once all else is; until then the corners are those measured.
     let board = print.on(problem.board);
     let with_print = JointProblem { board: &board, free: solution.free, ..problem };
     let solution = determined(joint::fit(&with_print, &solution.as_start(), work.cancel))?;
     Ok(solution.map(|solution| (print, solution)))
 }
 
-/// Print errors that were shown beside an estimate without, decided again where the target is bent as well: points that are off within
-/// the plane look like a bend.
+/// Print errors that were shown against an estimate without them, decided again where the target is bent as well: points that are
+/// off within the plane look like a bend.
 fn on_flat_target(
     problem: &JointProblem<'_>,
     without: &JointSolution,
@@ -305,9 +305,9 @@ fn on_flat_target(
     Ok(if is_bent { shown } else { (print, solution) })
 }
 
-/// Tries the depths of the views, and takes them unless they make predictions of held-out views worse by more than chance. That
-/// they make them better is seldom seen: they tell what corners do not. One session in twenty goes without depths that are right,
-/// which is cheap, and depths that are not harm.
+/// Tries the depths of the views, and takes them unless they make predictions of held-out views worse by more than chance. An
+/// improvement is seldom visible: they determine what corners do not. One session in twenty leaves out depths that are right,
+/// which costs little, whereas wrong depths do harm.
 fn depths(
     problem: &JointProblem<'_>,
     screened: &mut Screened,
@@ -339,7 +339,7 @@ fn depths(
     Ok(Some((depths, accepted.then_some(found.other))))
 }
 
-/// What needs the whole problem.
+/// Results that need the whole problem.
 pub struct Judged {
     pub heldout: Option<quality::HeldOut>,
     pub expected_heldout_rms_px: f64,
@@ -361,7 +361,8 @@ pub fn judge(
     let expected = joint::prediction::expected_residuals(problem, solution, *work)?;
     let widening = overdispersion::check(problem, solution, shown, work.cancel)?;
     let size = size::size(problem, solution, work.cancel)?;
-    // Where the answer takes a wrong size for true its scatter is that of the size, and no reason to doubt another one.
+    // Where the answer takes a wrong size for true, its overdispersion is due to the size, and no reason to doubt
+    // another one.
     let size = if problem.free.scale { size.map(|size| size.widened(widening.factor)) } else { size };
     solution.widen(&widening);
     Ok(Judged {

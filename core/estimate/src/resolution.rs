@@ -1,10 +1,10 @@
 //! What no session resolves: the one floor below which nothing is a finding, an outlier or a failed verification.
 //!
 //! Simulated sessions may be exact. What is left in them is the rounding of grey levels, how a renderer draws an edge, and the
-//! rounding of numbers. It is no Gaussian noise, views and corners share it, and tests whose noise levels are estimated from the
-//! data take it for a fault, because it stands out of nothing. So whatever is judged is judged by noise levels that are at least
-//! those of the best robots and cameras, and what is smaller than they resolve is not reported. The estimate, its weights and its
-//! stated error do not know of it.
+//! rounding of numbers. It is not Gaussian noise, views and corners share it, and tests whose noise levels are estimated from the
+//! data take it for a fault, because there is no other noise. So all tests use noise levels that are at least those of the best
+//! robots and cameras, and what is smaller than they resolve is not reported. The estimate, its weights and its stated error do
+//! not use this floor.
 //!
 //! Derivation: `docs/maths/resolution.md`.
 
@@ -13,14 +13,14 @@ pub(crate) use handeye_pairs::pose_graph::{ANGLE_RAD, PLACE_M};
 use handeye_wording::text;
 use handeye_wording::{Value, shown};
 
-/// What all corners of a view may be off by together, pixels: half a grey level over a contrast of 160, which is how far an edge
-/// moves when all its pixels are rounded alike. More would hide what sharp images of 0.03 px show of a lens.
+/// Error that all corners of a view may share, pixels: half a grey level over a contrast of 160, which is how far an edge moves
+/// when all its pixels are rounded alike. A larger value would hide what sharp images of 0.03 px show about a lens.
 pub(crate) const CORNER_PX: f64 = 0.003;
-/// A distance of a corner, or the RMS of a view, that is as good as images get, pixels: the detector's own errors are 0.03 px at
-/// the most in images without noise, and 0.04 px RMS with ten grey levels of it.
+/// A distance of a corner, or the RMS of a view, that is as good as images get, pixels: the detector's own errors are at most
+/// 0.03 px in images without noise, and 0.04 px RMS with ten grey levels of it.
 pub(crate) const FINE_PX: f64 = 0.05;
-/// A depth of the target's plane that no depth camera resolves, metres: a third of what a disparity known to a hundredth of a pixel is
-/// off (0.03 mm half a metre away, base line 75 mm, 1000 px), and as much as a robot resolves.
+/// A depth of the target's plane that no depth camera resolves, metres: a third of the depth error of a disparity known to a
+/// hundredth of a pixel (0.03 mm half a metre away, base line 75 mm, 1000 px), and as much as a robot resolves.
 pub(crate) const DEPTH_M: f64 = 1e-5;
 
 /// Whether a displacement is one that a robot resolves, by its length \[m\] or its angle \[rad\].
@@ -28,12 +28,12 @@ pub(crate) fn is_resolved(metres: f64, radians: f64) -> bool {
     metres >= PLACE_M || radians >= ANGLE_RAD
 }
 
-/// A length \[m\] of the robot in words: what no robot resolves is below that.
+/// A length \[m\] of the robot in words: one that no robot resolves is given as below the resolution.
 pub fn place_text(metres: f64) -> Value {
     reported(metres, PLACE_M, &|m| format!("{} mm", shown(m * 1e3, 3)))
 }
 
-/// An angle \[rad\] likewise.
+/// The same for an angle \[rad\].
 pub fn angle_text(radians: f64) -> Value {
     reported(radians, ANGLE_RAD, &|rad| format!("{}°", shown(rad.to_degrees(), 3)))
 }
@@ -47,8 +47,8 @@ pub(crate) fn judged_by(noise: &Noise) -> Noise {
     Noise { robot_m: noise.robot_m.max(PLACE_M), robot_rad: noise.robot_rad.max(ANGLE_RAD), ..*noise }
 }
 
-/// The variance \[px²\] that the pose of a view from so many corners is judged by, `variance (JᵀJ)⁻¹` being its covariance: what
-/// corners share does not average out over them.
+/// The variance \[px²\] that the pose of a view from this many corners is judged by, `variance (JᵀJ)⁻¹` being its covariance:
+/// what corners share does not average out over them.
 pub(crate) fn pose_variance_px2(variance_px2: f64, corners: usize) -> f64 {
     variance_px2.max(corners as f64 * CORNER_PX * CORNER_PX)
 }

@@ -1,16 +1,17 @@
-//! How near a tool arrives at a point that the camera saw, where of the arm no more is known than how accurate it is.
+//! How near a tool arrives at a point that the camera saw, where only the accuracy of the arm is known.
 //!
 //! # What it estimates
-//! The distance of [`reach_error`](crate::reach_error) by the controller as it is, for an arm whose joints or chain are not known.
+//! The distance of [`reach_error`](crate::reach_error) by the uncorrected controller, for an arm whose joints or chain are not
+//! known.
 //!
 //! # Model
-//! Where the tip really is differs from where the robot reports it by a shift and a turn, normal and alike in all directions, with
-//! the stated accuracy as the root mean square of the shift. At the view, at the touch and at each turn by which the tool is found
-//! they are drawn anew, although what an arm is off in a whole region is alike: of the touches of 17 real arms 95 % and more are within,
-//! of arms that are off by more where they touch than where they look 82 % and more. What the views show of the robot's noise and
-//! its pose-dependent error counts where it is more than what was stated.
+//! Where the tip really is differs from where the robot reports it by a shift and a turn, normal and isotropic, with the stated
+//! accuracy as the root mean square of the shift. At the view, at the touch and at each turn by which the tool is found they are
+//! drawn again, although the errors of an arm in a whole region are similar: of the touches of 17 real arms 95 % and more are
+//! within, of arms with larger errors where they touch than where they look 82 % and more. What the views show of the robot's noise
+//! and its pose-dependent error counts where it exceeds the stated accuracy.
 //!
-//! Makers state no accuracy of rotations. It is counted as [`TURN_PER_M`] says.
+//! Makers state no accuracy of rotations. It follows from [`TURN_PER_M`].
 //!
 //! # Reference
 //! ISO 9283 (pose accuracy); the 17 factory calibrations of `tests/studies/arm_errors`.
@@ -29,31 +30,32 @@ use crate::reach_error::{
 use handeye_geometry::frames::{Camera, Pose, Target};
 use handeye_geometry::targets::TargetSpec;
 
-/// Turn of the tip in radians for each metre that it is off, root mean square each: of a recorded UR5e, whose nominal chain is 0.41 mm
-/// and 0.145° off its controller's. Of 17 factory calibrations it is 2 to 4.
+/// Orientation error of the tip in radians per metre of position error, root mean square each: that of a recorded UR5e, whose
+/// nominal chain is 0.41 mm and 0.145° off its controller's. For 17 factory calibrations it is 2 to 4.
 pub(crate) const TURN_PER_M: f64 = 6.0;
 
-/// Accuracies that a robot may be given, millimetres: from less than any arm has to a robot that is better calibrated first.
+/// Accuracies that may be stated for a robot, millimetres: from better than any arm to a robot that should be calibrated
+/// first.
 pub const ROBOT_ACCURACY_MM: RangeInclusive<f64> = 0.001..=100.0;
 
-/// What is known of a robot beforehand, and the tool that it shall bring somewhere.
+/// What is known of a robot beforehand, and the tool that it positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RobotAccuracy {
-    /// Distance between where the tip is and where the robot reports it, root mean square over the region in which it works, with base
-    /// and TCP where that is least, millimetres.
+    /// Distance between where the tip is and where the robot reports it, root mean square over the region in which it works, with
+    /// base and TCP where that is least, millimetres.
     pub accuracy_mm: f64,
     /// Where the tip of its tool is in the frame of the tip, metres.
     pub tool_m: [f64; 3],
 }
 
 impl RobotAccuracy {
-    /// In millimetres, with a usual tool where none is named.
+    /// With an accuracy in millimetres, and a usual tool where none is stated.
     pub fn new(accuracy_mm: f64, tool_m: Option<[f64; 3]>) -> Self {
         Self { accuracy_mm, tool_m: tool_m.unwrap_or(USUAL_TOOL) }
     }
 }
 
-/// What a robot is off, standard deviations per axis, metres and radians.
+/// Errors of a robot, standard deviations per axis, metres and radians.
 #[derive(Debug, Clone, Copy)]
 struct Off {
     metres: f64,
@@ -68,14 +70,14 @@ impl Off {
     }
 }
 
-/// How a touch turns with the hand-eye transform, and the root of its covariance by what the robot is off.
+/// Jacobian of a touch by the hand-eye transform, and the root of its covariance by the errors of the robot.
 type Missed = (Matrix3x6<f64>, Matrix3<f64>);
 
 /// How near a tool arrives by a calibration of a robot of which the accuracy is known.
 #[derive(Debug, Clone)]
 pub struct ReachByAccuracy {
     hand_eye: HandEye,
-    /// Of the hand-eye transform, metres and radians.
+    /// Covariance of the hand-eye transform, metres and radians.
     covariance: Matrix6<f64>,
     law: SmallSample,
     views: Vec<Pose<Camera, Target>>,
@@ -83,14 +85,14 @@ pub struct ReachByAccuracy {
     accuracy: RobotAccuracy,
     off: Off,
     tool: Vector3<f64>,
-    /// Of the place where the tip of the tool is found, in the frame of the tip.
+    /// Covariance of the place where the tip of the tool is found, in the frame of the tip.
     tool_covariance: Matrix3<f64>,
 }
 
 impl ReachByAccuracy {
-    /// Of a calibration by reported poses; `shown` is what its views show the robot to be off, standard deviations per axis, metres and
-    /// radians, and `views` where the camera saw the target. `None` without views, and for a covariance that is
-    /// none.
+    /// The reach with a calibration by reported poses; `shown` are the errors of the robot that its views show, standard deviations
+    /// per axis, metres and radians, and `views` where the camera saw the target. `None` without views, and for a covariance that
+    /// is not valid.
     pub(crate) fn new(
         accuracy: &RobotAccuracy,
         shown: [f64; 2],
@@ -107,25 +109,26 @@ impl ReachByAccuracy {
         (!by_accuracy.views.is_empty()).then_some(by_accuracy)
     }
 
-    /// At points of the target where it was seen.
+    /// Errors at points of the target where it was seen.
     pub(crate) fn at_target(&self) -> Option<ReachErrors> {
         let points = self.target.points();
         let seen = |view: usize, random: &mut Draw| self.views[view].isometry() * points[random.below(points.len())];
         if points.is_empty() { None } else { self.errors(seen) }
     }
 
-    /// At points in the coordinates of a camera beside the arm, metres: the largest of their errors. `None` with a camera on the arm.
+    /// Errors at points in the coordinates of a camera next to the robot, metres: the largest of their errors. `None` with a camera
+    /// on the arm.
     pub(crate) fn at_points(&self, in_camera: &[Point3<f64>]) -> Option<ReachErrors> {
         let points = in_camera.iter().filter(|_| self.stands_still());
         points.filter_map(|point| self.errors(|_, _| *point)).reduce(ReachErrors::worse)
     }
 
-    /// Whether the camera is beside the arm.
+    /// Whether the camera is next to the robot (eye to hand).
     pub(crate) fn stands_still(&self) -> bool {
         self.hand_eye.mode() == Mode::EyeToHand
     }
 
-    /// What was said of the robot and its tool.
+    /// What was stated about the robot and its tool.
     pub(crate) fn accuracy(&self) -> &RobotAccuracy {
         &self.accuracy
     }
@@ -137,7 +140,7 @@ impl ReachByAccuracy {
         Some(ReachErrors {
             as_it_is_95_m,
             corrected_95_m: None,
-            // A draw may be shorter with what is added to it.
+            // A draw may get shorter by what is added to it.
             as_it_is_least_95_m: self.quantile(&touches, &Matrix6::zeros())?.min(as_it_is_95_m),
             repeatability_95_m: None,
         })
@@ -145,7 +148,7 @@ impl ReachByAccuracy {
 
     /// The quantile of the distances where the covariance of the hand-eye transform has this root.
     fn quantile(&self, touches: &[Missed], of_hand_eye: &Matrix6<f64>) -> Option<f64> {
-        // As good as infinite.
+        // Practically infinite.
         let freedom = self.law.degrees_of_freedom.min(1e4);
         let law = ChiSquared::new(freedom).ok()?;
         let mut random = Draw::new(SEED);
@@ -161,7 +164,7 @@ impl ReachByAccuracy {
         quantile(distances)
     }
 
-    /// How a touch turns with the hand-eye transform, and the root of its covariance by what the robot is off.
+    /// Jacobian of a touch by the hand-eye transform, and the root of its covariance by the errors of the robot.
     fn touch(&self, plan: &Plan, axis: &Vector3<f64>) -> Option<Missed> {
         let seen = &self.views[plan.view];
         let base_from_tip = *self.hand_eye.base_from_tip(seen).isometry();
@@ -187,8 +190,8 @@ impl ReachByAccuracy {
     }
 }
 
-/// Covariance of the place `t` of the tip of a tool for which with the shift `s` all `R_k (t − l_k) − s` are least, where each `l_k` has
-/// this one.
+/// Covariance of the place `t` of the tip of a tool for which with the shift `s` all `R_k (t − l_k) − s` are least, where each
+/// `l_k` has this one.
 fn of_tool(turns: &[UnitQuaternion<f64>], of_each: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let rows = turns.iter().map(|turn| (pivot_row(turn), *turn.to_rotation_matrix().matrix()));
     let information: Matrix6<f64> = rows.clone().map(|(row, _)| row.transpose() * row).sum();

@@ -9,7 +9,7 @@ use crate::diagnose::{Calibration, Promise, calibrate_with};
 use crate::handeye::joint::Noise;
 use crate::{Method, Options};
 
-/// Draws: a covariance scatters by 3 % over so many.
+/// Draws: a covariance scatters by 3 % over this many.
 const DRAWN: usize = 4000;
 
 /// Touches of a view.
@@ -35,7 +35,7 @@ fn how_near_a_tool_arrives_is_known_where_the_accuracy_is_and_grows_with_it() {
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
         assert_eq!(calibrated(mode, PRECISE, None).reach_errors(), None);
         let [half, one, two] = [0.5, 1.0, 2.0].map(|mm| calibrated(mode, PRECISE, Some(mm)));
-        // The camera's part is small beside these.
+        // The camera's part is small compared with these.
         assert!((stated_mm(&one) / stated_mm(&half) - 2.0).abs() < 0.05, "{mode:?}: {}", stated_mm(&half));
         assert!((stated_mm(&two) / stated_mm(&one) - 2.0).abs() < 0.05, "{mode:?}: {}", stated_mm(&one));
         let reach = one.reach_errors().expect("as above");
@@ -47,8 +47,8 @@ fn how_near_a_tool_arrives_is_known_where_the_accuracy_is_and_grows_with_it() {
     }
 }
 
-/// A shift of a millimetre is 1.6 mm in 95 of 100 cases; a turn of 0.34° moves the tip of a tool of 0.1 m by as much as half of it, and a
-/// point of the board at 0.4 m by two millimetres.
+/// A shift of a millimetre is 1.6 mm in 95 of 100 cases; a turn of 0.34° moves the tip of a tool of 0.1 m by as much as half of it,
+/// and a point of the board at 0.4 m by two millimetres.
 #[test]
 fn a_camera_on_the_arm_is_off_with_the_arm() {
     let [on, beside] = [Mode::EyeInHand, Mode::EyeToHand].map(|mode| stated_mm(&calibrated(mode, PRECISE, Some(1.0))));
@@ -56,7 +56,7 @@ fn a_camera_on_the_arm_is_off_with_the_arm() {
     assert!(on > 1.5 * beside, "{on} mm, {beside} mm");
 }
 
-/// Whichever of its numbers is the larger: a robot that shifts by little and turns by much.
+/// This holds for either of its two numbers: a robot that shifts by little and turns by much.
 #[test]
 fn a_robot_that_scatters_more_than_it_is_said_to_counts_as_it_scatters() {
     let coarse = Noise { robot_m: 1e-3, robot_rad: 1e-4, ..PRECISE };
@@ -93,8 +93,8 @@ fn the_tip_of_a_tool_is_found_as_uncertainly_as_drawn_ones_scatter() {
     assert!((scatter - stated).norm() < 0.1 * stated.norm(), "{scatter} {stated}");
 }
 
-/// Touches by another computation: the pose of the tip is off by a shift and a turn at the view, at the touch and where the tool is found,
-/// and the camera is off on its mount.
+/// Touches by another computation: the pose of the tip is off by a shift and a turn at the view, at the touch and where the tool is
+/// found, and the camera is off on its mount.
 #[test]
 fn touches_of_a_robot_that_is_off_as_said_are_within_in_95_of_100() {
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
@@ -123,7 +123,7 @@ fn touches_of_a_robot_that_is_off_as_said_are_within_in_95_of_100() {
                 let at_view = tip * pose_error(&mut normal);
                 let believed = camera(&hand_eye, &tip) * in_camera;
                 let truth = camera(&truly, &at_view) * in_camera;
-                // The tool by turns about one point: each leaves its tip where the tip is off.
+                // The tool by turns about one point: each leaves its tip off by the error of the arm's tip.
                 let (mut information, mut right) = (Matrix6::zeros(), Vector6::zeros());
                 for turn in &turns {
                     let place = pose_error(&mut normal).inverse() * tool;
@@ -140,7 +140,8 @@ fn touches_of_a_robot_that_is_off_as_said_are_within_in_95_of_100() {
             }
         }
         let share = within as f64 / (EACH * seen.len()) as f64;
-        // Of 2,000 touches 95 % ± 1 % by chance; the tool here has the turn of the tip, which the views of a camera beside the arm mix.
+        // Of 2,000 touches 95 % ± 1 % by chance; the tool here has the turn of the tip, which the views of a camera next to the
+        // robot mix.
         assert!((0.935..0.97).contains(&share), "{mode:?}: {share}");
     }
 }

@@ -1,8 +1,8 @@
 //! The size of the target as the robot's motion shows it.
 //!
-//! The answer takes the stated size for true. With the size free beside all else that it counts on (a bend, the robot's field, a
-//! lens) the same fit says how large the target is, and how well that is known: with a field, which another size resembles, it may
-//! not be known at all.
+//! The answer takes the stated size for true. With the size free in addition to all else that it includes (a bend, the robot's
+//! field, a lens) the same fit determines how large the target is, and with what uncertainty: with a field, which another size
+//! resembles, it may not be determined at all.
 
 use nalgebra::{SVector, Vector6};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
@@ -18,12 +18,12 @@ use handeye_geometry::se3;
 /// picked. One in ten thousand, because noise of real robots has longer tails than a Gaussian.
 pub(crate) const FALSE_ALARM: f64 = 1e-4;
 
-/// Relative size below which another size, however certain, is left alone: a print is true to a few parts in a thousand, and the lengths
-/// of an arm are off alike by as much.
+/// Relative size below which another size, however certain, is left alone: a print is true to a few parts in a thousand, and the
+/// common error of the lengths of an arm is as large.
 pub(crate) const LEAST_SCALE: f64 = 3e-3;
 
 impl TargetSize {
-    /// The same with all variances so many times as large, because the data show that they are.
+    /// The same with all variances this many times as large, because the data show that they are.
     #[must_use]
     pub(super) fn widened(mut self, factor: f64) -> Self {
         self.sigma *= factor.sqrt();
@@ -41,14 +41,14 @@ impl TargetSize {
         self.found_from() < SIZE_SIGMA
     }
 
-    /// From which relative difference on another size is found.
+    /// Relative difference from which another size is detected.
     fn found_from(&self) -> f64 {
         let law = FisherSnedecor::new(1.0, self.degrees_of_freedom.clamp(1.0, 1e6));
         law.map_or(f64::INFINITY, |f| f.inverse_cdf(1.0 - FALSE_ALARM).sqrt()) * self.sigma
     }
 }
 
-/// The size of the target by an estimate of `problem`; `None` where it says nothing of it.
+/// The size of the target by an estimate of `problem`; `None` where it does not determine it.
 pub(super) fn size(
     problem: &JointProblem<'_>,
     solution: &JointSolution,
@@ -64,7 +64,7 @@ pub(super) fn size(
     let Some(found) = found else { return Ok(None) };
     let Some(sigma) = found.scale_sigma().filter(|sigma| sigma.is_finite() && *sigma > 0.0) else { return Ok(None) };
     let scale = found.shape.scale;
-    // What is known of sizes beforehand draws the size towards the stated one, and the transform with it.
+    // The prior of sizes pulls the size towards the stated one, and the transform with it.
     let (variance, known) = (sigma * sigma, SIZE_SIGMA * SIZE_SIGMA);
     let at = 12 + found.free.form().scale_at(&found.intrinsics);
     let with_size: SVector<f64, 6> = found.covariance.fixed_view::<6, 1>(0, at).into_owned();

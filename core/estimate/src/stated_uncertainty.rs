@@ -1,8 +1,9 @@
 //! Which error may be stated for a calibration.
 //!
-//! A covariance is true when the model is. Where the data support an explanation that the answer does not count on (a
-//! board of another size, a lens that was given wrongly, a board that slipped), the answer is off by what that
-//! explanation would move it; that is added to the error. Where the data contradict themselves no error is stated.
+//! A covariance is true when the model is. Where the data support an explanation that the answer does not account for
+//! (a board of another size, a lens that was given wrongly, a board that slipped), the error of the answer is as large
+//! as that explanation would move it; that is added to the error. Where the data contradict themselves no error is
+//! stated.
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 
@@ -18,14 +19,14 @@ use handeye_geometry::{point_error, se3};
 pub enum StatedUncertainty {
     /// The model explains the data: the error is that of its covariance.
     AsModelled,
-    /// The data support explanations that the answer does not count on.
+    /// The data support explanations that the answer does not account for.
     Moved(Vec<Alternative>),
     /// The data contradict themselves: no error can be stated.
     Nothing,
 }
 
-/// Where the hand-eye transform would be by an explanation that the answer does not count on. Where the joints of the arm are known it is
-/// that of corrected poses.
+/// Where the hand-eye transform would be by an explanation that the answer does not account for. Where the joints of the arm are
+/// known it is that of corrected poses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Alternative {
     /// `log(X⁻¹ X')` of the hand-eye transform `X` as it is and `X'` by the explanation, `[t; r]` in m and rad.
@@ -45,12 +46,12 @@ impl Alternative {
         shift * point - point
     }
 
-    /// The length that the error of a `point` by the answer as it is stays under with a probability of 95 % where this is the truth,
-    /// metres: of a vector with this mean and this covariance. Its square is taken for a multiple of chi-square with the mean and the
+    /// The length that the error of a `point` by the answer stays below with a probability of 95 % where this is the truth, metres:
+    /// of a vector with this mean and this covariance. Its square is taken for a multiple of chi-square with the mean and the
     /// variance that it has (Patnaik 1949, "The non-central χ² and F-distributions and their applications"), which is true to 2 %.
     pub fn error_95_m(&self, law: SmallSample, point: &Point3<f64>) -> f64 {
         let (mean, covariance) = (self.moved(point), point_error::covariance(&self.covariance, point));
-        // What is not known of the size of the errors makes them larger.
+        // The uncertainty of the size of the errors makes them larger.
         let wider = (law.radius_95(&covariance) / SmallSample::KNOWN.radius_95(&covariance)).powi(2);
         let covariance = if wider.is_finite() { covariance * wider } else { covariance };
         let expected = mean.norm_squared() + covariance.trace();
@@ -67,22 +68,22 @@ impl Alternative {
         Self { shift, covariance: self.covariance }
     }
 
-    /// Mean square of the error of the answer as it is where this is the truth, `[t; r]`.
+    /// Mean square of the error of the answer where this is the truth, `[t; r]`.
     pub(crate) fn mean_square(&self) -> Matrix6<f64> {
         self.covariance + self.shift * self.shift.transpose()
     }
 }
 
 impl StatedUncertainty {
-    /// The same for the answer `other` where this is for the answer `own`: the explanations are where they are.
+    /// The same for the answer `other` where this is for the answer `own`: the explanations stay at their place.
     #[must_use]
     pub(crate) fn of_another(&self, own: &Pose<Mount, Camera>, other: &Pose<Mount, Camera>) -> Self {
         let Self::Moved(alternatives) = self else { return self.clone() };
         Self::Moved(alternatives.iter().map(|alternative| alternative.of_another(own, other)).collect())
     }
 
-    /// How far explanations that the answer does not count on would move a `point` (camera coordinates, metres), metres;
-    /// of several the one that moves it farthest. Zero where there is none.
+    /// How far explanations that the answer does not account for would move a `point` (camera coordinates, metres),
+    /// metres; of several the one that moves it farthest. Zero where there is none.
     pub fn moved_m(&self, point: &Point3<f64>) -> f64 {
         match self {
             Self::Moved(alternatives) => alternatives.iter().map(|a| a.moved_m(point)).fold(0.0, f64::max),
@@ -90,12 +91,12 @@ impl StatedUncertainty {
         }
     }
 
-    /// The length that the error of a point in camera coordinates stays under with a probability of 95 %, metres, from
-    /// the covariance `[t; r]` of the hand-eye transform (right perturbation) and the law of its error; `None` when
-    /// nothing may be stated.
+    /// The length that the error of a point in camera coordinates stays below with a probability of 95 %, metres, from
+    /// the covariance `[t; r]` of the hand-eye transform (right perturbation) and the distribution of its error; `None`
+    /// when nothing may be stated.
     ///
     /// An alternative adds how far it moves the point to the error that remains: that of the model, or that under the
-    /// alternative where it is larger, because what it moves is known only so well.
+    /// alternative where it is larger, because its effect has an uncertainty of its own.
     pub fn error_95_m(&self, covariance: &Matrix6<f64>, law: SmallSample, point: &Point3<f64>) -> Option<f64> {
         self.parts_95_m(covariance, law, point).map(|(moved_m, rest_m)| moved_m + rest_m)
     }
@@ -129,7 +130,7 @@ mod tests {
         Matrix6::from_diagonal(&Vector6::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)) * sigma_m * sigma_m
     }
 
-    /// Against drawn vectors.
+    /// Compared with drawn vectors.
     #[test]
     fn the_error_under_an_alternative_is_that_of_a_vector_with_a_mean() {
         use crate::handeye::draw::Draw;
@@ -154,7 +155,7 @@ mod tests {
                 covariance: Matrix6::from_diagonal(&Vector6::new(x, y, z, 0.0, 0.0, 0.0)),
             };
             let ratio = alternative.error_95_m(SmallSample::KNOWN, &point) / drawn_m;
-            // Chi-square is within 2 %, and so many draws within 1 %.
+            // Chi-square is within 2 %, and this many draws within 1 %.
             assert!((0.97..1.03).contains(&ratio), "{axes:?} {mean}: {ratio}");
         }
         let nothing = Alternative { shift: Vector6::zeros(), covariance: Matrix6::zeros() };

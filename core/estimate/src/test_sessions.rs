@@ -1,4 +1,4 @@
-//! What tests of the estimate ask of a simulated session.
+//! What tests of the estimate need from a simulated session.
 
 use handeye_geometry::se3;
 use handeye_geometry::targets::bent::BoardShape;
@@ -40,7 +40,7 @@ impl Estimated for Session {
     }
 }
 
-/// What is off about the links of a usual arm, by another convention than the estimator's: `a`, `d` \[m\], `alpha`, zero \[rad\].
+/// Errors of the links of a usual arm, by another convention than the estimator's: `a`, `d` \[m\], `alpha`, zero \[rad\].
 pub(crate) const OFF_LINKS: [[f64; 4]; 6] = [
     [1e-4, -2e-4, 4e-4, 0.0],
     [-3e-4, 0.0, -9e-4, 1.2e-3],

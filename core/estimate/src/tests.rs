@@ -58,7 +58,7 @@ fn residuals_stand_where_corners_were_measured_with_a_lens_beyond_its_model_too(
     assert!(shown.rms_px > 0.1, "{shown:?}");
     for (view, result) in t.views.iter().zip(&found.views) {
         for (corner, residual) in view.corners.iter().zip(&result.residuals) {
-            // The field is taken a little beside the corner, and has a slope of 0.2 px in fifty.
+            // The field is taken a little away from the corner, and has a slope of 0.2 px in fifty.
             assert!((corner.px - residual.px).norm() < 5e-3, "{corner:?} {residual:?}");
         }
     }
@@ -245,7 +245,7 @@ fn a_board_drawn_on_the_pixels_of_a_bitmap_is_no_bent_one_and_no_other_lens() {
         t.add_print_errors(&errors);
         let joint = solve(&t.observations(true), Method::Joint).joint.expect("joint");
         let print = joint.print.expect("seen");
-        // A twelfth of the square of a pixel, but for what a shift of all is.
+        // A twelfth of the square of a pixel, except for a shift of all points.
         assert!((print.rms_m() / (pixel_m / 12_f64.sqrt()) - 1.0).abs() < 0.5, "{}", print.rms_m());
         sessions += usize::from(joint.shape.is_some() || joint.residual_distortion.is_some());
     }
@@ -275,7 +275,7 @@ fn the_size_of_the_target_is_found_when_it_is_asked_for() {
     assert!((found.shape.scale - 1.02).abs() < 4.0 * sigma && sigma < 2e-3, "{found:?}");
 }
 
-/// Of a target that is always seen alike what is smooth over the image is smooth over the target, too.
+/// With a target that is always seen the same way, what is smooth over the image is smooth over the target, too.
 #[test]
 fn what_the_lens_does_beyond_its_model_is_not_taken_for_the_print() {
     for (seed, amplitude_px) in (900..906).flat_map(|seed| [(seed, 0.2), (seed, 0.3)]) {

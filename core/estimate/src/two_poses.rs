@@ -1,14 +1,14 @@
 //! Which of the two poses of a flat target a view has, by the chain of all views.
 //!
 //! The corners of a small, distant, little tilted target leave two poses possible, and the one that fits them better is the
-//! wrong one in up to a third of such views ([`planar_pose`]). The chain of the robot and the other views knows better.
+//! wrong one in up to a third of such views ([`planar_pose`]). The chain of the robot and the other views resolves this.
 
 use crate::handeye::PosePair;
 use crate::handeye::closed_form::ClosedFormSolution;
 use handeye_geometry::frames::{Camera, Pose, Target};
 use handeye_geometry::planar_pose;
 
-/// Takes the other pose of every view where the chain is nearer to it; whether there was any.
+/// Takes the other pose of every view where the chain is nearer to it; returns whether there was any.
 pub(super) fn take_agreeing(
     pairs: &mut [PosePair],
     alternatives: &mut [Option<Pose<Camera, Target>>],
@@ -64,7 +64,7 @@ mod tests {
             }
             assert!(deceptive > 15, "the scene does not test what it should: {deceptive}");
             // Judged by the pose that fits the corners better, half of them were. What is left is noise of a pose that
-            // is not Gaussian: it is linearised, and near a view square on the tilt is anything but linear.
+            // is not Gaussian: it is linearised, and near a view square on the tilt is strongly nonlinear.
             assert!(called * 5 <= deceptive, "{called} of {deceptive}");
         }
     }

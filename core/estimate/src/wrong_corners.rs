@@ -3,14 +3,14 @@
 use crate::resolution;
 use handeye_geometry::targets::observation::Corners;
 
-/// A corner is wrong beyond so many times the residual that nine in ten corners stay below: seven and a half standard
+/// A corner is wrong beyond this many times the residual that nine in ten corners stay below: seven and a half standard
 /// deviations of Gaussian noise.
 const TIMES_COMMON: f64 = 3.5;
-/// The quantile that the residuals are measured by.
+/// The quantile that residuals are compared with.
 const COMMON: f64 = 0.9;
 /// Part of a view's corners that has to remain: with fewer the view is wrong, not its corners.
 const LEAST_PART: f64 = 0.5;
-/// And so many of them, which a pose takes.
+/// And at least this many of them, which a pose needs.
 const LEAST: usize = 4;
 
 /// The length of a residual \[px\] beyond which a corner is wrong, by the lengths of all corners; `None` without any.

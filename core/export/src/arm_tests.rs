@@ -14,7 +14,7 @@ use handeye_result::testing::{golden, golden_arm, golden_arm_with_a_field};
 use handeye_result::{ArmEstimate, CalibrationResult};
 use proptest::prelude::*;
 
-/// What a number with every digit leaves of a product of seven transforms, metres and radians.
+/// Rounding error of a product of seven transforms, metres and radians.
 const NEAR: f64 = 1e-9;
 const UR_KINDS: [ArmKind; 7] =
     [ArmKind::Ur3, ArmKind::Ur5, ArmKind::Ur10, ArmKind::Ur3e, ArmKind::Ur5e, ArmKind::Ur10e, ArmKind::Ur16e];
@@ -42,7 +42,7 @@ fn text_of(format: &str, name: &str, result: &CalibrationResult) -> String {
     file_of(format, name, result, &ExportNames::default(), &[]).text
 }
 
-/// Where the corrected arm of a result has the tip.
+/// Tip pose by the corrected arm of a result.
 fn actual(result: &CalibrationResult, joints: &[f64]) -> Matrix4<f64> {
     let arm = result.arm.as_ref().expect("an arm").corrected_arm().expect("an arm");
     arm.actual(joints).expect("so many").matrix()
@@ -123,7 +123,7 @@ fn same(what: &str, got: &Matrix4<f64>, expected: &Matrix4<f64>) {
     assert!(off < NEAR, "{what} is off by {off:e}: {got}{expected}");
 }
 
-/// Arms of every shape that errors are estimated of, where they stand and with a tool.
+/// Arms of every shape that errors are estimated for, at a place and with a tool.
 fn arms() -> Vec<(&'static str, Arm)> {
     let mount = nalgebra::Isometry3::new([0.3, -0.2, 0.8].into(), [0.1, -0.4, 2.0].into());
     let tool = nalgebra::Isometry3::new([0.01, 0.02, 0.15].into(), [0.6, 0.1, -0.3].into());

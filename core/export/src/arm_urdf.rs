@@ -1,7 +1,7 @@
 //! URDF of the corrected arm: links, joints with their limits, and a fixed joint to the tip.
 //!
-//! Errors of the joints are in the origins, so that joints count as the controller's do and every URDF parser has the arm as it is,
-//! but for what it gives way by under gravity: URDF has no place for that. Source: URDF XML specification (`origin`, `axis`,
+//! Errors of the joints are in the origins, so that joint values are those of the controller and every URDF parser gets the true
+//! arm, except for its deflection under gravity: URDF has no place for that. Source: URDF XML specification (`origin`, `axis`,
 //! `limit`).
 
 use std::fmt::Write as _;

@@ -1,4 +1,5 @@
-//! COLMAP text model: `cameras.txt`, `images.txt` and an empty `points3D.txt`, without which COLMAP reads none.
+//! COLMAP text model: `cameras.txt`, `images.txt` and an empty `points3D.txt`, without which COLMAP does not read the
+//! model.
 //!
 //! The world is the robot's base. An image has `camera_from_base` as a quaternion w x y z and a translation in metres.
 //! COLMAP's pixel (0, 0) is the corner of the top-left pixel: its principal point is half a pixel larger.

@@ -7,17 +7,18 @@ use super::{ExportError, ExportInput};
 use handeye_arm::{Arm, Joint, JointKind};
 use handeye_result::ResultProblem;
 
-/// The arm of a result as its controller counts, and as it is but for gravity and for what changes with the place of the tip.
+/// The arm of a result as its controller models it, and as it really is except for gravity and errors that depend on the
+/// place of the tip.
 #[derive(Debug, Clone)]
 pub(super) struct CorrectedChain {
-    /// As the controller counts.
+    /// As the controller models it.
     pub nominal: Arm,
     /// With its joints where they really are.
     pub corrected: Arm,
 }
 
 impl CorrectedChain {
-    /// Of a result whose views do not speak against it.
+    /// The arm of a result whose views do not contradict it.
     pub fn of(input: &ExportInput<'_>, format: &'static str) -> Result<Self, ExportError> {
         let arm = input.result.arm.as_ref().ok_or(ExportError::NeedsArm { format })?;
         if arm.contradicted {
@@ -35,7 +36,7 @@ impl CorrectedChain {
     }
 }
 
-/// What the first comment says of an arm: which transform, units, what is not in it, what it goes with, and what made it.
+/// The first comment for an arm: which transform, units, what is not in it, what it belongs to, and what made it.
 pub(super) fn about_arm(input: &ExportInput<'_>, [base, tip]: [&str; 2], rotation: &str) -> String {
     let field = input.result.arm.as_ref().and_then(|arm| arm.field.as_ref()).map_or_else(String::new, |field| {
         let (mm, deg) = (field.typical_mm, field.typical_deg);
@@ -49,7 +50,7 @@ pub(super) fn about_arm(input: &ExportInput<'_>, [base, tip]: [&str; 2], rotatio
 }
 
 /// A joint that is turned by its value about z of its own frame: its place in the frame before it, where each frame is given by
-/// what stands between the one of the chain, with z along its axis, and its own.
+/// the transform between the one of the chain, with z along its axis, and its own.
 pub(super) fn joint_origins(
     arm: &Arm,
     first: &Isometry3<f64>,
@@ -81,7 +82,7 @@ pub(super) fn joint_names(joints: &[Joint]) -> Vec<String> {
     unique(joints.iter().map(|joint| identifier(&joint.name)), &[])
 }
 
-/// Names of which none is taken; one that is gets an underscore behind it.
+/// Names that are all unused; a used one gets an underscore appended.
 pub(super) fn unique(names: impl Iterator<Item = String>, taken: &[&str]) -> Vec<String> {
     let mut found: Vec<String> = Vec::new();
     for mut name in names {

@@ -20,8 +20,8 @@ use handeye_wording::Text;
 pub(super) struct DhTable;
 
 const HEADER: &str = "joint,a_m,alpha_rad,d_m,theta_offset_rad,beta_rad";
-/// Sine of the angle between two axes below which they are nearly parallel: six degrees, far from the quarter turns and the errors of
-/// arms.
+/// Sine of the angle between two axes below which they are nearly parallel: six degrees, far from the quarter turns and the
+/// errors of arms.
 const PARALLEL: f64 = 0.1;
 /// Distance \[m\] across below which an axis goes on in the one before it.
 const SAME_LINE_M: f64 = 1e-12;
@@ -66,7 +66,7 @@ impl Row {
         let theta_offset_rad = normal.y.atan2(normal.x);
         let side = Vector3::z().cross(&normal);
         let a_m = point.dot(&normal);
-        // How far along the next axis the foot of the normal is from its point.
+        // Distance along the next axis of the foot of the normal from its point.
         let along = -point.dot(&side) / z.dot(&side);
         let alpha_rad = (-z.dot(&side)).atan2(z.z);
         Self { a_m, alpha_rad, d_m: point.z + along * z.z, theta_offset_rad, beta_rad: 0.0 }
@@ -101,7 +101,7 @@ fn rows(arm: &Arm) -> Vec<(String, Row)> {
         base_from_row *= row.at(0.0);
         found.push((name, row));
     }
-    // On the z axis of the tip already: what is left is a turn about it and a shift along it.
+    // On the z axis of the tip already: a rotation about it and a shift along it remain.
     let rest = base_from_row.inverse() * tip;
     let x = rest.rotation * Vector3::x();
     let row = Row::of_numbers([0.0, 0.0, rest.translation.z, x.y.atan2(x.x), 0.0]);

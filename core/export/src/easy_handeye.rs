@@ -2,7 +2,7 @@
 //!
 //! Its publisher reads `~/.ros/easy_handeye/<namespace>.yaml`, where the last part of the namespace is the name of the
 //! calibration and the mode, and broadcasts from `robot_effector_frame` (eye on hand) or `robot_base_frame` (eye on
-//! base) to `tracking_base_frame`. The parameters become arguments of a constructor: no key may be there besides.
+//! base) to `tracking_base_frame`. The parameters become arguments of a constructor: no other key is allowed.
 
 use super::text::{Rotation, about_transform, entries, quoted};
 use super::yaml::{Leaf, Yaml};

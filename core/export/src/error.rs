@@ -11,7 +11,7 @@ pub enum ExportError {
     /// No format of that name.
     #[error("unknown export format {name:?}: choose from {known}")]
     UnknownFormat {
-        /// The name that was asked for.
+        /// The requested name.
         name: String,
         /// The names there are.
         known: String,
@@ -67,7 +67,7 @@ pub enum ExportError {
         /// The export format, as the command line names it.
         format: &'static str,
     },
-    /// An arm that views left out speak against.
+    /// An arm that held-out views contradict.
     #[error(
         "{format} is about the corrected arm, and views left out of this calibration are predicted worse by it than by the arm as its \
          controller counts: capture more views and calibrate again, or export urdf or another format of the hand-eye"
@@ -83,7 +83,7 @@ pub enum ExportError {
     OtherArm {
         /// The export format, as the command line names it.
         format: &'static str,
-        /// What about it.
+        /// The reason.
         problem: &'static str,
     },
     /// No view has a robot pose, for a format about the camera's pose in every image.
@@ -111,15 +111,15 @@ pub enum ExportError {
         format: &'static str,
         /// The view.
         name: String,
-        /// What is wrong with it, and what to do.
+        /// What is wrong with the name, and what to do.
         problem: &'static str,
     },
     /// A name that some format cannot hold.
     #[error("{what} {name:?} cannot be used as a name: letters, digits and _ - . / are allowed")]
     BadName {
-        /// Which name.
+        /// The name.
         what: &'static str,
-        /// The name that was asked for.
+        /// The requested name.
         name: String,
     },
     /// Two frames with one name.
@@ -132,7 +132,7 @@ pub enum ExportError {
         /// Their name.
         name: String,
     },
-    /// Where the optical frame is stated to be is no place.
+    /// The stated pose of the optical frame is invalid.
     #[error(
         "the optical frame in the camera link, {translation_m:?} m and {rotation_xyzw:?} xyzw, is not a pose: it needs \
          finite numbers and a unit quaternion"
@@ -146,20 +146,20 @@ pub enum ExportError {
     /// A result that must not be.
     #[error("the result cannot be exported: {0}")]
     BadResult(ResultProblem),
-    /// The file system says no.
+    /// The file system refuses.
     #[error("{file}: cannot be written: {problem}", file = file.display())]
     Io {
         /// The file or folder.
         file: PathBuf,
-        /// What the system says.
+        /// The error of the operating system.
         problem: String,
     },
-    /// The file does not say what the result says: a defect of this program.
+    /// The file differs from the result: a defect of this program.
     #[error("{file}: reads back differently: {difference}; please report this", file = file.display())]
     ReadBack {
         /// The file that was written.
         file: PathBuf,
-        /// What differs.
+        /// The difference.
         difference: String,
     },
 }

@@ -1,7 +1,7 @@
 //! The JSON of ETH Zürich's `hand_eye_calibration`: `writeJson` in its `extrinsic_calibration.py`.
 //!
 //! Quaternions are Hamilton's, i j k w. `delay`, the time between the streams of robot and camera, is 0: here the robot
-//! stands still at every capture. JSON has no comments; extra keys are left out.
+//! is at rest at every capture. JSON has no comments; extra keys are left out.
 
 use serde::{Deserialize, Serialize};
 

@@ -4,7 +4,7 @@ use super::tests::{file_of, golden_views};
 use super::*;
 use handeye_result::testing::{GOLDEN_TRANSLATION_M, GOLDEN_XYZW, golden};
 
-/// What nine digits leave, for numbers up to about 1.
+/// Rounding error of nine digits, for numbers up to about 1.
 const NINE_DIGITS: f64 = 5e-9;
 
 /// Rotation of the golden hand-eye by rows.
@@ -14,7 +14,7 @@ const MATRIX: [[f64; 3]; 3] = [
     [0.198669331, 0.336062681, 0.920647800],
 ];
 const RPY: [f64; 3] = [0.35, -0.20, 1.40];
-/// What MoveIt prints: Eigen's `eulerAngles(0, 1, 2)`, R = Rx · Ry · Rz.
+/// MoveIt's convention: Eigen's `eulerAngles(0, 1, 2)`, R = Rx · Ry · Rz.
 const MOVEIT_RPY: [f64; 3] = [0.257237, 0.311187, 1.394907];
 const ROTATION_VECTOR: [f64; 3] = [0.429877369, 0.079930497, 1.414769930];
 const INVERSE_TRANSLATION_M: [f64; 3] = [0.011290914, 0.024638899, -0.077688094];
@@ -216,7 +216,7 @@ fn urdf_and_xacro_have_rpy_about_fixed_axes() {
 
 #[test]
 fn a_camera_link_takes_the_place_of_the_optical_frame() {
-    // The body of the camera lies where its driver says, 15 mm beside the lens.
+    // The body of the camera is where its driver states, 15 mm from the lens.
     let link = CameraLink { translation_m: [0.0, 0.015, 0.0], ..CameraLink::default() };
     let names = ExportNames { camera_link: Some(link), ..ExportNames::default() };
     let urdf = file_of("urdf", "my_cell.urdf", &golden(), &names, &[]).text;

@@ -1,4 +1,4 @@
-//! What is exported, in the names of the export.
+//! Input of an export, with the names in it.
 
 use nalgebra::Isometry3;
 

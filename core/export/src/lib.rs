@@ -1,8 +1,8 @@
 //! Calibration files of other programs.
 //!
-//! Every format is one [`Format`] in [`formats`]. A file says in its first comment which way its transform goes, has
-//! every digit of every number, and is read back after writing and compared: a file that does not say what the result
-//! says is an error and not a file. `docs/reference/exports.md` lists the formats with their readers, directions and units.
+//! Every format is one [`Format`] in [`formats`]. A file states in its first comment the direction of its transform, has
+//! every digit of every number, and is read back after writing and compared: a file that differs from the result is an
+//! error and is not kept. `docs/reference/exports.md` lists the formats with their readers, directions and units.
 //!
 //! # Example
 //! ```
@@ -87,7 +87,7 @@ pub trait Format: Send + Sync {
     /// Name on the command line, `snake_case`.
     fn name(&self) -> &'static str;
 
-    /// What it is and who reads it, in half a sentence.
+    /// Its contents and its readers, in half a sentence.
     fn description(&self) -> Text;
 
     /// The files of an input that was checked; [`preview`] checks it.
@@ -99,7 +99,7 @@ pub trait Format: Send + Sync {
     /// Parses a file of [`Self::render`] and compares it with the input.
     ///
     /// # Errors
-    /// What differs by more than [`TOLERANCE`] or cannot be found, as text.
+    /// Differences of more than [`TOLERANCE`] and missing values, as text.
     fn compare(&self, file: &ExportFile, input: &ExportInput<'_>) -> Result<(), String>;
 }
 
@@ -146,7 +146,7 @@ pub fn by_name(name: &str) -> Result<&'static dyn Format, ExportError> {
 /// The files of a format as they would be written, without writing anything.
 ///
 /// # Errors
-/// [`ExportError`] when the names or the result are not usable or the format cannot hold them: the text says why and
+/// [`ExportError`] when the names or the result are not usable or the format cannot hold them: the text states why and
 /// what to do.
 pub fn preview(format: &dyn Format, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {
     input.names.check()?;
@@ -154,9 +154,8 @@ pub fn preview(format: &dyn Format, input: &ExportInput<'_>) -> Result<Vec<Expor
     format.render(input)
 }
 
-/// Writes the files of all `formats` into a folder, which is made where there is none, reads every file back and
-/// compares it with the result. Gives the paths written, in order. Files and links that were there are replaced, each as a
-/// whole.
+/// Writes the files of all `formats` into a folder, which is created if needed, reads every file back and compares it with
+/// the result. Gives the paths written, in order. Files and links that were there are replaced, each as a whole.
 ///
 /// # Errors
 /// [`ExportError`] for the first format that cannot be written; everything is rendered before anything is written.

@@ -50,7 +50,7 @@ impl Format for Mrcal {
         handeye_wording::text!(".cameramodel of mrcal with intrinsics, and the hand-eye as extrinsics")
     }
 
-    /// Needs intrinsics; without a hand-eye the extrinsics are the identity, and the comment says so.
+    /// Needs intrinsics; without a hand-eye the extrinsics are the identity, and the comment states that.
     fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {
         let k = input.intrinsics(self.name())?;
         let model = model(&k)?;

@@ -7,7 +7,7 @@ use super::ExportError;
 
 /// Rotation of the optical frame in the body frame of a camera: x forward, y left, z up (ROS REP 103), as x, y, z, w.
 pub const REP103_OPTICAL_XYZW: [f64; 4] = [-0.5, 0.5, -0.5, 0.5];
-/// How far the length of a quaternion may be from 1: what six printed decimals leave.
+/// Largest deviation of a quaternion's length from 1: the rounding of six printed decimals.
 const UNIT_TOLERANCE: f64 = 1e-5;
 
 /// Names of frames, camera and calibration in the files of other programs.
@@ -44,7 +44,7 @@ pub struct CameraLink {
 }
 
 impl Default for CameraLink {
-    /// `camera_link` where the optical frame is, turned as ROS REP 103 says.
+    /// `camera_link` where the optical frame is, turned as in ROS REP 103.
     fn default() -> Self {
         Self { frame: "camera_link".into(), translation_m: [0.0; 3], rotation_xyzw: REP103_OPTICAL_XYZW }
     }
@@ -85,12 +85,12 @@ impl Default for ExportNames {
 }
 
 impl ExportNames {
-    /// Checks that every name can stand in every format: letters, digits and `_ - . /`, beginning with a letter, a
+    /// Checks that every name is valid in every format: letters, digits and `_ - . /`, beginning with a letter, a
     /// digit, `_` or `/`; no two frames have the same.
     ///
     /// # Errors
-    /// [`ExportError::BadName`] names the first that cannot, [`ExportError::SameFrame`] the frames that share one,
-    /// [`ExportError::BadCameraLink`] an offset that is none.
+    /// [`ExportError::BadName`] names the first that is not, [`ExportError::SameFrame`] the frames that share one,
+    /// [`ExportError::BadCameraLink`] an invalid offset.
     pub fn check(&self) -> Result<(), ExportError> {
         let link = self.camera_link.as_ref().map(|link| ("camera link", &link.frame));
         let frames = [

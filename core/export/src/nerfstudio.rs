@@ -2,9 +2,8 @@
 //!
 //! The world is the robot's base. A `transform_matrix` is `base_from_camera` in OpenGL's camera axes (x right, y up, z
 //! backwards), in metres: the second and third column are negated. Pixel (0, 0) is the corner of the top-left pixel, so
-//! the principal point is half a pixel larger. `file_path` is relative to the folder of this file, which belongs beside
-//! the folder of images. JSON has no comments.
-//! Source: nerfstudio's documentation, "Data conventions".
+//! the principal point is half a pixel larger. `file_path` is relative to the folder of this file, which belongs next
+//! to the folder of images. JSON has no comments. Source: nerfstudio's documentation, "Data conventions".
 
 use serde::{Deserialize, Serialize};
 

@@ -1,6 +1,6 @@
 //! OpenCV `FileStorage` YAML, with the keys of its calibration samples.
 //!
-//! `T_<parent>_<child>` is the 4×4 hand-eye matrix in metres; characters of frame names that cannot stand in a key are
+//! `T_<parent>_<child>` is the 4×4 hand-eye matrix in metres; characters of frame names that are not valid in a key are
 //! written `_`. `distortion_model` is for people and programs that ask: `brown_conrady` and `rational` go with
 //! `cv::projectPoints`, `fisheye` goes with `cv::fisheye::projectPoints`.
 

@@ -35,7 +35,7 @@ pub(super) fn split_numbers(text: &str) -> Vec<String> {
     parts
 }
 
-/// Where the numbers of a file are that are not in a comment, as (line, part of [`split_numbers`]).
+/// Places of the numbers in a file that are not in a comment, as (line, part of [`split_numbers`]).
 fn numbers_in(text: &str) -> Vec<(usize, usize)> {
     let mut found = Vec::new();
     for (number, line) in text.lines().enumerate() {
@@ -66,7 +66,7 @@ fn rotations() -> impl Strategy<Value = UnitQuaternion<f64>> {
             .try_normalize(1e-3)
             .map_or_else(UnitQuaternion::identity, |axis| UnitQuaternion::from_scaled_axis(axis * angle))
     });
-    // At and beside gimbal lock, where one of two angles is arbitrary.
+    // At and near gimbal lock, where one of two angles is arbitrary.
     let locked = (-3.2..3.2, prop::bool::ANY, -20.0..-1.0, -3.2..3.2).prop_map(|(roll, up, off, yaw)| {
         let pitch = std::f64::consts::FRAC_PI_2 - f64::powf(10.0, off);
         rotation::from_rpy([roll, if up { pitch } else { -pitch }, yaw])
@@ -92,7 +92,7 @@ fn lenses() -> impl Strategy<Value = Distortion> {
     ]
 }
 
-/// An arm of Universal Robots with errors, where it stands and with a tool.
+/// An arm of Universal Robots with errors, at a place and with a tool.
 fn arms() -> impl Strategy<Value = ArmEstimate> {
     let errors = prop::collection::vec(-0.02..0.02_f64, arm_parameters(6).len());
     (errors, isometries(), isometries()).prop_map(|(values, mount, tool)| {

@@ -9,7 +9,7 @@ const GIMBAL_LOCK: f64 = 1e-12;
 /// Roll, pitch, yaw in radians with R = Rz(yaw) · Ry(pitch) · Rx(roll): URDF, turns about fixed axes x, y, z.
 ///
 /// Pitch is in [−π/2, π/2]. The angles reproduce the rotation to rounding everywhere: at and near gimbal lock yaw is
-/// arbitrary, and roll is what is left once yaw is taken off, so that errors of the two do not add up.
+/// arbitrary, and roll is the remainder after yaw is removed, so that errors of the two do not add up.
 pub(super) fn rpy(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
     let r = rotation.to_rotation_matrix().into_inner();
     let is_locked = r[(0, 0)].hypot(r[(1, 0)]) < GIMBAL_LOCK;

@@ -1,4 +1,4 @@
-//! What the text formats share: numbers, names, comments, and their comparison after reading back.
+//! Shared parts of the text formats: numbers, names, comments, and their comparison after reading back.
 
 use nalgebra::Isometry3;
 
@@ -6,7 +6,7 @@ use super::input::NamedTransform;
 use super::{TOLERANCE, rotation};
 use handeye_result::CalibrationResult;
 
-/// How the rotation of a file is to be read: the words of its first comment.
+/// Rotation convention of a file: the words of its first comment.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Rotation {
     Quaternion,
@@ -31,7 +31,7 @@ impl Rotation {
     }
 }
 
-/// What the first comment says of a transform: which way, units, and what made it. One line, ASCII.
+/// The first comment for a transform: its direction, units, and what made it. One line, ASCII.
 pub(super) fn about_transform(
     transform: &NamedTransform<'_>,
     unit: &str,
@@ -46,7 +46,7 @@ pub(super) fn about_transform(
     )
 }
 
-/// What the first comment says of a camera alone.
+/// The first comment for a camera alone.
 pub(super) fn about_intrinsics(result: &CalibrationResult) -> String {
     format!(
         "Intrinsics in pixels, pixel (0, 0) is the centre of the top-left pixel; no transform and no Euler angles. {}",
@@ -56,7 +56,7 @@ pub(super) fn about_intrinsics(result: &CalibrationResult) -> String {
 
 /// Program and input that a result comes from.
 pub(super) fn made_by(result: &CalibrationResult) -> String {
-    // Free text must not end the comment that it stands in.
+    // Free text must not end the comment that it is in.
     fn plain(text: &str) -> String {
         text.chars().filter(char::is_ascii_graphic).take(64).collect()
     }
@@ -106,7 +106,7 @@ pub(super) fn quoted(name: &str) -> String {
     if is_plain && !is_word { name.to_owned() } else { format!("\"{name}\"") }
 }
 
-/// A frame name as an identifier: characters that cannot stand in one are written `_`.
+/// A frame name as an identifier: characters that are not valid in one are written `_`.
 pub(super) fn identifier(name: &str) -> String {
     let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     if plain.starts_with(|c: char| c.is_ascii_digit()) { format!("_{plain}") } else { plain }

@@ -5,7 +5,7 @@
 //!
 //! `Tz(d1) Rz(q1) · Rx(90°) Rz(q2) · Tx(a2) Rz(q3) · T(a3, 0, d4) Rz(q4) · Ty(−d5) Rx(90°) Rz(q5) · Ty(d6) Rx(−90°) Rz(q6)`
 //!
-//! with the tool flange at the end. Where a chain comes from decides where its own frames lie along their axes; these lie where the
+//! with the tool flange at the end. The source of a chain determines where its own frames are along their axes; these are where the
 //! meshes of the description expect them.
 
 use std::f64::consts::FRAC_PI_2;
@@ -15,8 +15,8 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vect
 use super::corrected::frames_at_zero;
 use handeye_arm::Arm;
 
-/// How far a chain may be from that of the description with the same lengths, metres and radians: files write a quarter turn with
-/// five digits.
+/// Largest difference of a chain from that of the description with the same lengths, metres and radians: files write a quarter
+/// turn with five digits.
 const SAME: f64 = 1e-4;
 /// Joint values at which the two are compared: none is special for any of the axes.
 const COMPARED_AT: [[f64; 6]; 3] = [[0.0; 6], [0.7, -1.3, 1.9, 0.4, -0.8, 2.3], [-2.1, 0.6, -0.9, -1.7, 1.2, -0.5]];
@@ -31,7 +31,7 @@ pub(super) struct UrFrames {
 }
 
 impl UrFrames {
-    /// Of an arm by its nominal chain; words that say what of it is no arm of Universal Robots.
+    /// From the nominal chain of an arm; otherwise a text that states how it differs from an arm of Universal Robots.
     pub fn of(arm: &Arm) -> Result<Self, &'static str> {
         if arm.joint_count() != 6 {
             return Err("an arm of Universal Robots has six joints");
@@ -84,7 +84,7 @@ fn measured(
     }
     let x = y.cross(&z).normalize();
     let turn = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, z.cross(&x), z]));
-    // Where the chain begins, if that is on the first axis; otherwise what of the axis is nearest to it.
+    // The beginning of the chain, if that is on the first axis; otherwise the nearest point of the axis.
     let origin = point(0) + z * (first.translation.vector - point(0)).dot(&z);
     let rotation = UnitQuaternion::from_rotation_matrix(&turn);
     let base_from_robot = Isometry3::from_parts(origin.into(), rotation);
@@ -100,7 +100,7 @@ fn measured(
     Ok((base_from_robot, [d1, a2, a3, d4, d5, d6]))
 }
 
-/// What stands before each joint in the description with nominal numbers.
+/// The transform before each joint in the description with nominal numbers.
 fn frames_of([d1, a2, a3, d4, d5, d6]: &[f64; 6]) -> [Isometry3<f64>; 6] {
     let frame = |x: f64, y: f64, z: f64, roll: f64| {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), roll);
@@ -116,7 +116,7 @@ fn frames_of([d1, a2, a3, d4, d5, d6]: &[f64; 6]) -> [Isometry3<f64>; 6] {
     ]
 }
 
-/// Where the last of these frames is with these joint values.
+/// Pose of the last of these frames with these joint values.
 pub(super) fn forward(frames: &[Isometry3<f64>], joints: &[f64]) -> Isometry3<f64> {
     let turn = |angle: f64| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
     frames.iter().zip(joints).fold(Isometry3::identity(), |before, (frame, angle)| before * frame * turn(*angle))

@@ -27,7 +27,7 @@ const KEYS: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
 /// Joint values at which the file is multiplied out again.
 const COMPARED_AT: [[f64; 6]; 2] = [[0.4, -1.1, 1.6, -2.0, -1.4, 0.9], [-2.3, 0.5, -1.2, 0.8, 2.1, -3.0]];
 
-/// What the file holds, and what is around it.
+/// Contents of the file, and its context.
 struct Kinematics {
     corrected: Arm,
     base_from_robot: Isometry3<f64>,

@@ -5,7 +5,7 @@
 //! reader takes lines: everything before `rows:` is header, every line behind `data:` is a row.
 //!
 //! ViSP's lens has one radial coefficient each way (kud, kdu), and the one way is not exactly the inverse of the other.
-//! So the camera is written for a lens without distortion alone; the pose file says so when it is left out.
+//! So the camera is written for a lens without distortion alone; the pose file states when it is left out.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 

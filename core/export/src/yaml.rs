@@ -10,7 +10,7 @@ use super::text::{compare_numbers, compare_text};
 #[derive(Debug)]
 pub(super) struct Yaml(BTreeMap<String, Leaf>);
 
-/// What a path holds.
+/// The value at a path.
 #[derive(Debug)]
 pub(super) enum Leaf {
     Number(f64),
@@ -37,7 +37,7 @@ impl Yaml {
         Ok(Self(leaves))
     }
 
-    /// Compares every value with what it has to be; nothing may be missing and nothing may be there besides.
+    /// Compares every value with the expected one; no value may be missing or additional.
     pub fn compare(&self, expected: &[(impl AsRef<str>, Leaf)]) -> Result<(), String> {
         for (path, leaf) in expected {
             let path = path.as_ref();

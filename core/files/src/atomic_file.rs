@@ -1,4 +1,4 @@
-//! Files that are there completely or not at all, also after a power cut, and that are where their name says: a link in
+//! Files that exist completely or not at all, also after a power cut, and that are where their path states: a link in
 //! their place is replaced and never followed.
 
 use std::ffi::OsString;
@@ -10,11 +10,11 @@ use tempfile::NamedTempFile;
 
 use crate::own_folder;
 
-/// How the hidden name of a file ends that is not whole yet.
+/// Ending of the hidden name of a file that is not complete yet.
 const ENDING: &str = "partial";
 
-/// Replaces `path` by `bytes` so that a reader, or a machine that stops at any moment, sees the old content or the
-/// new and never a part: written beside it under a new hidden name, flushed to the disk, renamed, the folder flushed.
+/// Replaces `path` by `bytes` so that a reader, or a machine that stops at any moment, sees the old content or the new
+/// and never a part: written next to it under a new hidden name, flushed to the disk, renamed, the folder flushed.
 ///
 /// The folder must exist. What an interrupted write leaves is known by [`is_partial`].
 ///
@@ -37,7 +37,7 @@ pub fn create(path: &Path) -> io::Result<File> {
     partial(path)?.persist(path).map_err(|e| e.error)
 }
 
-/// Whether a file of this name is what an interrupted write of the file `of` in the same folder has left.
+/// Whether a file of this name is the rest of an interrupted write of the file `of` in the same folder.
 pub fn is_partial(name: &str, of: &str) -> bool {
     name.strip_prefix('.').and_then(|rest| rest.strip_prefix(of)).is_some_and(|rest| {
         // Earlier programs had no random part.
@@ -61,7 +61,7 @@ fn parent(path: &Path) -> &Path {
     }
 }
 
-/// A new file beside `path` under a name that nobody can have foreseen; it is gone when it is dropped.
+/// A new file next to `path` with an unpredictable name; it is deleted when dropped.
 fn partial(path: &Path) -> io::Result<NamedTempFile> {
     let name = path
         .file_name()
@@ -76,7 +76,7 @@ fn partial(path: &Path) -> io::Result<NamedTempFile> {
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt as _;
-        // As any other new file: what the umask leaves.
+        // Permissions of any other new file: by the umask.
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
     builder.tempfile_in(parent(path))

@@ -1,14 +1,15 @@
-//! What the files of a recording, a data set or a session may name. Every way in asks here before a file is opened.
+//! Limits on the paths in the files of a recording, a data set or a session. Every access is checked here before a file
+//! is opened.
 //!
-//! Who sits at this machine may name whatever the system lets them read. Who sits at a browser may name only what lies in the
-//! folder that was opened for them, whatever the files in it say: links are followed before the answer, `..` leads out of a
-//! folder, and what is not there is outside as well.
+//! A user of this machine may name whatever the system lets them read. A user of a browser may name only what is in the
+//! folder that was opened for them, whatever the files in it state: links are resolved before the check, `..` leads out of a
+//! folder, and missing files count as outside.
 
 use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
-/// Deepest folder, and most names, that are looked at for links.
+/// Deepest folder, and most names, that are checked for links.
 const MAX_DEPTH: usize = 16;
 const MAX_NAMES: usize = 100_000;
 
@@ -40,7 +41,7 @@ impl Bounds {
     /// Refuses a folder with a link in it, however deep, that leads out.
     ///
     /// # Errors
-    /// [`io::ErrorKind::PermissionDenied`] names the link, or says that there is more than is looked at.
+    /// [`io::ErrorKind::PermissionDenied`] names the link, or states that there are too many entries to check.
     pub fn check_links(&self, folder: &Path) -> io::Result<()> {
         if self.0.is_none() {
             return Ok(());
@@ -70,13 +71,13 @@ impl Bounds {
     }
 }
 
-/// The path without links, as far as it exists; what does not exist is added as it stands.
+/// The path without links, as far as it exists; what does not exist is appended as it is.
 fn real(path: &Path) -> PathBuf {
     let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     for there in path.ancestors() {
         if let Ok(real) = there.canonicalize() {
             let rest = path.strip_prefix(there).unwrap_or_else(|_| Path::new(""));
-            // To add nothing would add a separator, with which a file is none.
+            // Joining an empty path would add a separator, with which a file is not found.
             return if rest.as_os_str().is_empty() { real } else { real.join(rest) };
         }
     }

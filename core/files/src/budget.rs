@@ -1,16 +1,16 @@
-//! How much time and unpacked data the reading of somebody else's files may take.
+//! Limits on time and unpacked data for reading foreign files.
 //!
-//! Nothing here reads a clock: whoever asks for the work gives it, and a test gives one that it sets.
+//! Nothing here reads a clock: the caller provides it, and a test provides one that it sets.
 
 use std::cell::Cell;
 use std::time::Duration;
 
 use handeye_geometry::progress::CancelToken;
 
-/// What the reading of one recording may take, unless a person allows more.
+/// Limits for reading one recording, unless the user allows more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// By the clock of the caller.
+    /// Time on the caller's clock.
     pub time: Duration,
     /// Bytes that come out of compressed files and are kept in memory or in temporary files.
     pub unpacked_bytes: u64,
@@ -46,8 +46,8 @@ pub enum Spent {
     Unpacked(u64),
 }
 
-/// The limits of one piece of work, and what of them is used. Once it is spent it stays so, so that work may end early in any
-/// place and whoever asked for it finds out why.
+/// The limits of one piece of work, and the used part of them. Once it is spent it stays so, so that work may end early in
+/// any place and its caller can determine why.
 pub struct Budget<'a> {
     cancel: &'a CancelToken,
     /// Time since the work began.
@@ -58,12 +58,12 @@ pub struct Budget<'a> {
 }
 
 impl<'a> Budget<'a> {
-    /// `elapsed` gives the time since the work began, and is asked often.
+    /// `elapsed` gives the time since the work began, and is called often.
     pub fn new(limits: Limits, elapsed: &'a dyn Fn() -> Duration, cancel: &'a CancelToken) -> Self {
         Self { cancel, elapsed, limits, unpacked_bytes: Cell::new(0), spent: Cell::new(None) }
     }
 
-    /// Whether work may go on; asked at least every few milliseconds of our own loops.
+    /// Whether work may go on; called at least every few milliseconds in our own loops.
     ///
     /// # Errors
     /// [`Spent`], the first reason there was.

@@ -1,5 +1,5 @@
-//! Sessions and data sets are folders that are handed around, so their content may be somebody else's: nothing is written
-//! through a link inside of one. A link above the folder, or to it, is the user's own and is followed.
+//! Sessions and data sets are folders that are handed around, so their content may come from another user: nothing is
+//! written through a link inside of one. A link above the folder, or to it, is the user's own and is followed.
 
 use std::fs;
 use std::io::{self, ErrorKind};
@@ -12,12 +12,12 @@ pub const DOCUMENT: &str = "session.json";
 /// Name of the journal in a session folder.
 pub const JOURNAL: &str = "journal.jsonl";
 
-/// Whether a folder claims to be a session.
+/// Whether a folder is marked as a session.
 pub fn is_session(folder: &Path) -> bool {
     [DOCUMENT, JOURNAL].iter().any(|name| folder.join(name).is_file())
 }
 
-/// The session or data set that a path lies in, the nearest above it; `None` when it lies in none.
+/// The session or data set that contains a path, the nearest above it; `None` when there is none.
 pub fn root_of(path: &Path) -> Option<PathBuf> {
     let path = std::path::absolute(path).ok()?;
     path.ancestors().skip(1).find(|folder| is_root(folder)).map(Path::to_path_buf)
@@ -27,7 +27,7 @@ pub fn root_of(path: &Path) -> Option<PathBuf> {
 /// there.
 ///
 /// # Errors
-/// [`ErrorKind::InvalidInput`] names the link and says what to do.
+/// [`ErrorKind::InvalidInput`] names the link and states what to do.
 pub fn check_folder(folder: &Path) -> io::Result<()> {
     let folder = std::path::absolute(folder)?;
     let mut link = None;
@@ -51,7 +51,7 @@ pub fn check_folder(folder: &Path) -> io::Result<()> {
 /// Refuses to open a file of a session for writing that is a link, a pipe or a device. It need not be there.
 ///
 /// # Errors
-/// [`ErrorKind::InvalidInput`] names the file and says what to do.
+/// [`ErrorKind::InvalidInput`] names the file and states what to do.
 pub fn check_file(path: &Path) -> io::Result<()> {
     match fs::symlink_metadata(path) {
         Ok(found) if found.is_symlink() => Err(is_a_link(path)),
@@ -65,7 +65,7 @@ pub fn check_file(path: &Path) -> io::Result<()> {
 /// The bytes of a file. A pipe or a device in its place is an error, not something to wait for.
 ///
 /// # Errors
-/// Whatever the file system reports; [`ErrorKind::InvalidInput`] for what is no file.
+/// Whatever the file system reports; [`ErrorKind::InvalidInput`] for anything that is not a file.
 pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     if fs::metadata(path)?.is_file() { fs::read(path) } else { Err(not_a_file(path)) }
 }

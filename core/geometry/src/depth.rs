@@ -12,12 +12,12 @@ use crate::statistics::{SIGMA_PER_MEDIAN_SIZE, median_high};
 const FAR_TOLERANCE: f32 = 1e-4;
 /// Measurements around a place that make a median where not all four around it are there.
 const MIN_AROUND: usize = 3;
-/// Depths around a place that differ by more than this part are those of two surfaces: a board seen at 80° from its
+/// Depths around a place that differ by more than this part belong to two surfaces: a board seen at 80° from its
 /// normal, with a pixel of 1/500, has 1 %.
 const ONE_SURFACE: f64 = 0.02;
-/// Depths off by more than this many standard deviations (from the median) are not of the surface.
+/// Depths off by more than this many standard deviations (from the median) do not belong to the surface.
 const OUTLIER: f64 = 4.0;
-/// Depths are never called outliers below this [m]: a depth camera's steps.
+/// Depths are never outliers below this [m]: a depth camera's steps.
 const OUTLIER_FLOOR_M: f64 = 1e-3;
 
 /// Why depths are not usable.
@@ -36,10 +36,10 @@ pub enum DepthError {
         /// Samples needed.
         need: usize,
     },
-    /// The range to colour, or the scale of the encoding, is empty or not a number.
+    /// The range to colour, or the scale of the encoding, is empty or NaN.
     #[error("{what} from {low} to {high} is not usable: both must be finite and the second larger")]
     BadRange {
-        /// What has the range.
+        /// What the range belongs to.
         what: &'static str,
         /// Lower end.
         low: f64,
@@ -70,23 +70,23 @@ pub struct DepthImage {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Row by row from the top left; NaN and numbers that are not positive stand for no measurement.
+    /// Row by row from the top left; NaN and numbers that are not positive mean no measurement.
     pub metres: Vec<f32>,
 }
 
-/// What a depth pixel says.
+/// Meaning of a depth pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DepthSample {
     /// A surface at this distance along the optical axis, metres.
     Metres(f32),
     /// Nothing up to the end of the sensor's range.
     Far,
-    /// No measurement: not a number, infinite below, zero or negative, or outside the image.
+    /// No measurement: NaN, negative infinity, zero or negative, or outside the image.
     Invalid,
 }
 
 impl DepthSample {
-    /// What a depth \[m\] says; `far_m` is the sensor's far plane, infinity when it has none.
+    /// Meaning of a depth \[m\]; `far_m` is the sensor's far plane, infinity when it has none.
     pub fn of(depth_m: f32, far_m: f32) -> Self {
         if depth_m.is_nan() || depth_m <= 0.0 {
             Self::Invalid
@@ -121,16 +121,16 @@ impl DepthImage {
         self.metres.get(index).map_or(DepthSample::Invalid, |&depth| DepthSample::of(depth, far_m))
     }
 
-    /// The depth of a surface between pixels, metres: by the inverse depths of the four around, which are linear over a
-    /// plane, where they are of one surface; next to a pixel without measurement, or at an edge, the median of those
-    /// around. `far_m` is the sensor's far plane, infinity when it has none.
+    /// The depth of a surface between pixels, metres: by the inverse depths of the four pixels around, which are linear
+    /// over a plane, where they belong to one surface; next to a pixel without measurement, or at an edge, the median
+    /// of those around. `far_m` is the sensor's far plane, infinity when it has none.
     pub fn at(&self, px: Vector2<f64>, far_m: f32) -> Option<f64> {
         let measured = |column: f64, row: f64| {
             if column < 0.0 || row < 0.0 {
                 return None;
             }
             match self.sample(column as u32, row as u32, far_m) {
-                // A far plane of its own keeps infinity out where the sensor states none.
+                // An infinite depth is excluded where the sensor states no far plane.
                 DepthSample::Metres(m) if m.is_finite() => Some(f64::from(m)),
                 _ => None,
             }
@@ -179,9 +179,9 @@ impl DepthImage {
         Ok((ray.z > 0.0).then(|| PointIn::new((ray.into_inner() * scale).into())))
     }
 
-    /// The depths as an image, red, green and blue of each pixel row by row: `near_m` is the map's first colour and `far_m` its last; depths outside are clipped.
-    /// Pixels without measurement are [`INVALID_COLOUR`] and those at the sensor's far plane `far_plane_m` are
-    /// [`FAR_COLOUR`], neither of which is in any map.
+    /// The depths as an image, red, green and blue of each pixel row by row: `near_m` is the map's first colour and `far_m` its
+    /// last; depths outside are clipped. Pixels without measurement are [`INVALID_COLOUR`] and those at the sensor's far plane
+    /// `far_plane_m` are [`FAR_COLOUR`], neither of which is in any map.
     ///
     /// # Errors
     /// [`DepthError::BadRange`], [`DepthError::WrongLength`] when the fields were set to disagree.
@@ -192,7 +192,7 @@ impl DepthImage {
         let table: Vec<[u8; 3]> = (0..=255).map(|i| map.colour(f64::from(i) / 255.0)).collect();
         self.image(|depth| match DepthSample::of(depth, far_plane_m) {
             DepthSample::Metres(m) => {
-                // In 0 ..= 255 by the clamp.
+                // In 0 ..= 255 because of the clamp.
                 table[(((m - near_m) / (far_m - near_m)).clamp(0.0, 1.0) * 255.0).round() as usize]
             }
             DepthSample::Far => FAR_COLOUR,
@@ -215,12 +215,13 @@ pub(crate) const INVALID_COLOUR: [u8; 3] = [255, 0, 255];
 /// Colour of pixels at the far plane: a dark blue-grey outside all maps.
 pub(crate) const FAR_COLOUR: [u8; 3] = [24, 28, 40];
 
-/// How far depths may be off the surface that the others are on, by the sizes of how far they are, metres.
+/// Largest distance of depths from the surface of the others before they count as outliers, by the sizes of all
+/// distances, metres.
 pub fn outlier_reach_m(off_m: &[f64]) -> f64 {
     (OUTLIER * SIGMA_PER_MEDIAN_SIZE * median_high(off_m.iter().copied()).unwrap_or(0.0)).max(OUTLIER_FLOOR_M)
 }
 
-/// How a number between 0 and 1 becomes a colour.
+/// A map from a number between 0 and 1 to a colour.
 ///
 /// The rainbows are linear between 17 anchors of their published tables of 256 colours and stay within 7 of 255 grey
 /// levels of them.
@@ -237,7 +238,7 @@ pub enum ColourMap {
 }
 
 impl ColourMap {
-    /// The colour of `t`, which is clipped to 0 … 1; not a number counts as 0.
+    /// The colour of `t`, which is clipped to 0 … 1; NaN counts as 0.
     pub fn colour(self, t: f64) -> [u8; 3] {
         let t = if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) };
         match self {

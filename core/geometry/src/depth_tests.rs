@@ -71,7 +71,7 @@ fn the_colours_of_missing_and_far_pixels_are_in_no_map() {
             let colour = map.colour(f64::from(i) / 1000.0);
             for special in [INVALID_COLOUR, FAR_COLOUR] {
                 let apart: u32 = (0..3).map(|c| u32::from(colour[c].abs_diff(special[c]))).sum();
-                // Grey passes the dark blue at a distance; to tell a colour on the screen takes about this much.
+                // Grey passes the dark blue at a distance; to distinguish a colour on the screen takes about this much.
                 assert!(apart >= 16, "{map:?} at {i}: {colour:?}");
             }
         }

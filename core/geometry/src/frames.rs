@@ -21,7 +21,7 @@
 //! let wrong = tip_from_camera * base_from_tip;
 //! ```
 //!
-//! and neither does a transform go where another is expected:
+//! and neither is a transform accepted where another is expected:
 //!
 //! ```compile_fail
 //! use handeye_geometry::frames::{Base, Pose, Tip};
@@ -135,7 +135,7 @@ impl<Dst, Src> Pose<Dst, Src> {
         Self { isometry, frames: PhantomData }
     }
 
-    /// From a translation in metres and a quaternion in the order x, y, z, w, which is normalised.
+    /// The transform with a translation in metres and a quaternion in the order x, y, z, w, which is normalised.
     pub fn from_translation_xyzw(translation_m: [f64; 3], xyzw: [f64; 4]) -> Self {
         let [x, y, z, w] = xyzw;
         Self::from_isometry(Isometry3::from_parts(
@@ -159,7 +159,7 @@ impl<Dst, Src> Pose<Dst, Src> {
         self.isometry.rotation
     }
 
-    /// Unit quaternion in the order x, y, z, w with w ≥ 0, as files want it.
+    /// Unit quaternion in the order x, y, z, w with w ≥ 0, as required in files.
     pub fn xyzw(&self) -> [f64; 4] {
         let q = self.isometry.rotation.coords;
         let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
@@ -183,7 +183,7 @@ impl<Dst, Src> Pose<Dst, Src> {
         Self::from_isometry(self.isometry * crate::se3::exp(delta))
     }
 
-    /// The same numbers between other frames. Say why at the call: this is the way around the type check.
+    /// The same numbers between other frames. State why at the call: this bypasses the type check.
     #[must_use]
     pub fn relabel<NewDst, NewSrc>(&self) -> Pose<NewDst, NewSrc> {
         Pose::from_isometry(self.isometry)

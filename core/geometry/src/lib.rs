@@ -1,4 +1,4 @@
-//! Rigid motions, frames, cameras, targets and views of a target: mathematics that knows nothing of calibration.
+//! Rigid motions, frames, cameras, targets and views of a target: mathematics independent of calibration.
 //!
 //! ```
 //! use handeye_geometry::camera::Intrinsics;
@@ -19,14 +19,14 @@
 //! | [`frames`], [`se3`] | poses that name their frames; exponential and logarithm |
 //! | [`camera`] | pinhole and fisheye lenses, projection, derivatives |
 //! | [`targets`] | chessboards, grids of dots, ChArUco, AprilGrid as data; observed corners |
-//! | [`observations`] | what a session saw: modes, views, what is known of the lens, levels of noise |
+//! | [`observations`] | what a session observed: modes, views, what is known of the lens, levels of noise |
 //! | [`planar_pose`] | pose of a flat target from its corners, and its mirror solution |
 //! | [`view_equations`] | normal equations of a view, which estimators share |
 //! | [`depth`] | depth images; the plane of a target in them is in [`targets::depth_plane`] |
-//! | [`progress`] | cancelling long work, and how far it is |
+//! | [`progress`] | cancelling long work, and its progress |
 //!
-//! Frames, units, the origin of pixels and the order of tangent vectors: `docs/reference/conventions.md`. Never depends on images, files,
-//! OpenCV, threads or clocks.
+//! Frames, units, the origin of pixels and the order of tangent vectors: `docs/reference/conventions.md`. Never depends on images,
+//! files, OpenCV, threads or clocks.
 
 #![warn(missing_docs)]
 

@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 
 /// Compares runs of digits by their value and everything else letter by letter. A total order: names of equal value
-/// (`a1`, `a01`) are told apart letter by letter.
+/// (`a1`, `a01`) are ordered letter by letter.
 pub fn compare(a: &str, b: &str) -> Ordering {
     let (mut left, mut right) = (a, b);
     loop {

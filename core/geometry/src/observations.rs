@@ -1,4 +1,5 @@
-//! What a session saw, as an estimator is given it: who carries the camera, what is known of the lens, and one entry per image.
+//! What a session observed, as input to an estimator: what carries the camera, what is known of the lens, and one entry per
+//! image.
 
 use nalgebra::{DMatrix, DVector, Isometry3, Vector2};
 use serde::{Deserialize, Serialize};
@@ -9,13 +10,13 @@ use crate::targets::TargetSpec;
 use crate::targets::depth_plane::DepthPlane;
 use crate::targets::observation::{Corners, View};
 
-/// Where the camera sits.
+/// Where the camera is mounted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mode {
-    /// The camera is on the tip, the target stands still.
+    /// The camera is on the tip, the target is fixed.
     EyeInHand,
-    /// The camera stands still, the target is on the tip.
+    /// The camera is fixed, the target is on the tip.
     EyeToHand,
 }
 
@@ -34,7 +35,7 @@ impl Mode {
 /// What was observed, from a dataset folder, a session or a live capture.
 #[derive(Debug, Clone)]
 pub struct Observations {
-    /// Where the camera sits; `None` when there is no robot and only the camera is calibrated.
+    /// Where the camera is mounted; `None` when there is no robot and only the camera is calibrated.
     pub mode: Option<Mode>,
     /// The target that is seen in all views.
     pub target: TargetSpec,
@@ -61,7 +62,7 @@ pub struct ObservedView {
     pub depth: Option<DepthPlane>,
     /// A target pose measured elsewhere, used when there are no corners.
     pub camera_from_target: Option<Pose<Camera, Target>>,
-    /// Whether the view takes part; one that does not touches no number.
+    /// Whether the view takes part; one that does not has no influence on results.
     pub in_fit: bool,
 }
 
@@ -97,7 +98,7 @@ impl From<&View> for ObservedView {
 pub enum CameraKnowledge {
     /// These intrinsics, taken as exact.
     Fixed(Intrinsics),
-    /// These intrinsics, as well as they are known.
+    /// These intrinsics, with their stated accuracy.
     Near(KnownLens),
     /// Intrinsics are estimated.
     Estimate {
@@ -113,25 +114,26 @@ impl CameraKnowledge {
     pub const NOTHING: Self = Self::Estimate { model: DEFAULT_MODEL, start: None };
 }
 
-/// How well a lens may be said to be known, pixels: a thousandth is exact for every purpose, and with a thousand nothing is known.
+/// Range of the accuracy that may be stated for a lens, pixels: a thousandth is exact for every purpose, and with a thousand
+/// nothing is known.
 pub const LENS_ACCURACY_PX: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
 
-/// A lens that is known to so many pixels.
+/// A lens that is known to this many pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KnownLens {
     /// The lens.
     pub intrinsics: Intrinsics,
-    /// What it may displace points of the image by in each of its parameters, one standard deviation, RMS over the image, pixels;
+    /// Displacement of image points by the error of each of its parameters, one standard deviation, RMS over the image, pixels;
     /// within [`LENS_ACCURACY_PX`]. All of them together displace points by that times the root of their number.
     pub accuracy_px: f64,
 }
 
 impl KnownLens {
-    /// Inverse of the covariance of its parameters, in the order of [`Intrinsics::parameters`]: a step `d` of them displaces the points
-    /// of the image by the length `√(dᵀ M d)`, RMS, and has the information `M / accuracy_px²`.
+    /// Inverse of the covariance of its parameters, in the order of [`Intrinsics::parameters`]: a step `d` of them displaces the
+    /// points of the image by the length `√(dᵀ M d)`, RMS, and has the information `M / accuracy_px²`.
     pub fn information(&self) -> DMatrix<f64> {
         const ALONG: u32 = 12;
-        /// Part of what each parameter is known by that it is known by itself.
+        /// Relative increase of the diagonal elements, so that the matrix is regular.
         const APART: f64 = 1e-6;
         let lens = &self.intrinsics;
         let count = lens.parameter_count();
@@ -140,7 +142,7 @@ impl KnownLens {
         let along = |size: u32, k: u32| (f64::from(k) + 0.5) / f64::from(ALONG) * f64::from(size) - 0.5;
         for (u, v) in (0..ALONG).flat_map(|u| (0..ALONG).map(move |v| (u, v))) {
             let px = Vector2::new(along(lens.width, u), along(lens.height, v));
-            // Where the model has no ray nothing is displaced.
+            // Points without a ray in the model are not displaced.
             let Some(pixel) = lens.unproject(&px).ok().and_then(|ray| lens.linearise(&ray).ok()) else { continue };
             let by = |axis: usize| DVector::from_fn(count, |k, _| pixel.by_parameters[k][axis]);
             for by in [by(0), by(1)] {
@@ -148,7 +150,8 @@ impl KnownLens {
             }
             seen += 1.0;
         }
-        // Some coefficients of a lens without distortion do the same as others together, and no view tells them apart either.
+        // Some coefficients of a lens without distortion have the same effect as others together, and no view separates them
+        // either.
         for k in 0..count {
             sum[(k, k)] *= 1.0 + APART;
         }
@@ -156,38 +159,38 @@ impl KnownLens {
     }
 }
 
-/// Lens model that is estimated when none is named: what OpenCV estimates by default.
+/// Lens model that is estimated when none is given: what OpenCV estimates by default.
 pub const DEFAULT_MODEL: Distortion = Distortion::BrownConrady([0.0; 5]);
 
 /// Noise levels, one standard deviation per axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
-    /// Of a corner, pixels.
+    /// Noise of a corner, pixels.
     pub corner_px: f64,
-    /// Of what all corners of a view have in common beyond that, pixels: errors of lens, target and image that look like
-    /// a pose. A pose from `n` corners has the covariance `(corner_px² + view_px²) (Jᵀ J)⁻¹`. Zero where the data ask for
+    /// Noise that all corners of a view share in addition, pixels: errors of lens, target and image that look like a
+    /// pose. A pose from `n` corners has the covariance `(corner_px² + view_px²) (Jᵀ J)⁻¹`. Zero where the data require
     /// none.
     pub view_px: f64,
-    /// Of the reported tip position, metres.
+    /// Noise of the reported tip position, metres.
     pub robot_m: f64,
-    /// Of the reported tip orientation, radians.
+    /// Noise of the reported tip orientation, radians.
     pub robot_rad: f64,
-    /// Of errors of the reported tip position that depend on where it is, as an affine function of it, metres: at a distance of the
-    /// RMS spread of the places from their mean. Zero where they are not in the model.
+    /// Pose-dependent error of the reported tip position, an affine function of the position, metres: at a distance of the RMS
+    /// spread of the places from their mean. Zero where they are not in the model.
     pub field_m: f64,
-    /// Of the reported tip orientation likewise, radians.
+    /// The same for the reported tip orientation, radians.
     pub field_rad: f64,
-    /// Of the angles of an arm's links (zeros of its joints, directions of their axes), radians. Zero where they are not in the
-    /// model, as the next two.
+    /// Errors of the angles of an arm's links (zeros of its joints, directions of their axes), radians. Zero where they are not
+    /// in the model, like the next two.
     pub link_rad: f64,
-    /// Of the lengths of its links (places of the axes), metres.
+    /// Errors of the lengths of its links (places of the axes), metres.
     pub link_m: f64,
-    /// Of what its joints give way by under gravity, radians where all of the arm is stretched out.
+    /// Deflection of its joints under gravity, radians for the arm stretched out.
     pub compliance_rad: f64,
 }
 
 impl Noise {
-    /// None at all.
+    /// No noise at all.
     pub const EXACT: Self = Self {
         corner_px: 0.0,
         view_px: 0.0,

@@ -10,12 +10,12 @@ use serde::{Deserialize, Serialize};
 pub struct CancelToken(Arc<AtomicBool>);
 
 impl CancelToken {
-    /// Asks the work to end.
+    /// Requests the work to end.
     pub fn cancel(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// Whether it was asked to.
+    /// Whether that was requested.
     pub fn is_cancelled(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
@@ -32,7 +32,7 @@ pub enum Stage {
     TargetPoses,
     /// The closed forms; counts methods.
     ClosedForms,
-    /// The joint estimate; counts rounds of weights and optimum, of which it seldom needs all.
+    /// The joint estimate; counts rounds of weights and optimum, seldom all of them are needed.
     Joint,
     /// Fits that leave views out; counts folds.
     HeldOut,
@@ -57,31 +57,31 @@ impl Stage {
     }
 }
 
-/// How far long work has come.
+/// Progress of long work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
-    /// What it is doing.
+    /// The present stage.
     pub stage: Stage,
     /// How much of this stage is done.
     pub done: usize,
-    /// Of how much; at least 1. A stage may end before `done` reaches it.
+    /// The total of this stage; at least 1. A stage may end before `done` reaches it.
     pub of: usize,
 }
 
 impl Progress {
-    /// Done part of the stage, 0 to 1.
+    /// Fraction of the stage that is done, 0 to 1.
     pub fn fraction(&self) -> f64 {
         self.done.min(self.of) as f64 / self.of.max(1) as f64
     }
 }
 
-/// What long work is given besides its input: a flag to poll, and where to say how far it is. Where no progress is
-/// wanted a `&CancelToken` does.
+/// What long work gets in addition to its input: a flag to poll, and a callback for its progress. Where no progress is
+/// wanted a `&CancelToken` is enough.
 #[derive(Clone, Copy)]
 pub struct Work<'a> {
     /// Polled at least every few milliseconds of our own loops; a call into OpenCV is not interrupted.
     pub cancel: &'a CancelToken,
-    /// Called on the thread that works, often; it must return at once.
+    /// Called often on the working thread; it must return at once.
     pub progress: &'a dyn Fn(Progress),
 }
 
@@ -97,7 +97,7 @@ impl Work<'_> {
         (self.progress)(Progress { stage, done, of: of.max(1) });
     }
 
-    /// Whether the work was asked to end.
+    /// Whether the work was requested to end.
     pub fn is_cancelled(&self) -> bool {
         self.cancel.is_cancelled()
     }

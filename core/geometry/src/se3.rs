@@ -1,14 +1,14 @@
 //! The group of rigid motions: exponential, logarithm, adjoint, means.
 //!
-//! Tangent vectors are `[tx ty tz rx ry rz]`, metres and radians, translation first; perturbations stand on the
-//! right, `T * exp(delta)`, so a covariance is expressed in the source frame of `T`.
-//! Formulas: Solà, Deray, Atchuthan 2018, "A micro Lie theory for state estimation in robotics", appendix D.
+//! Tangent vectors are `[tx ty tz rx ry rz]`, metres and radians, translation first; perturbations are on the right,
+//! `T * exp(delta)`, so a covariance is expressed in the source frame of `T`. Formulas: Solà, Deray, Atchuthan 2018, "A
+//! micro Lie theory for state estimation in robotics", appendix D.
 
 use nalgebra::{
     Isometry3, Matrix3, Matrix6, Quaternion, SymmetricEigen, Translation3, UnitQuaternion, Vector3, Vector6,
 };
 
-/// Below this angle \[rad\] the series are used: the next term of each is then under the rounding of an `f64`, while
+/// Below this angle \[rad\] the series are used: the next term of each is then below the rounding of an `f64`, while
 /// above it the cancellation in the closed forms, scaled by the squared angle that multiplies it, is too.
 const SMALL_ANGLE: f64 = 1e-2;
 
@@ -17,7 +17,7 @@ pub fn skew(v: &Vector3<f64>) -> Matrix3<f64> {
     v.cross_matrix()
 }
 
-/// `exp([rho; phi])` in SE(3): the screw motion, not translation and rotation apart.
+/// `exp([rho; phi])` in SE(3): the screw motion, not translation and rotation separately.
 pub fn exp(delta: &Vector6<f64>) -> Isometry3<f64> {
     let rho = delta.fixed_rows::<3>(0).into_owned();
     let phi = delta.fixed_rows::<3>(3).into_owned();
@@ -128,14 +128,14 @@ pub fn nearest_rotation(m: &Matrix3<f64>) -> nalgebra::Rotation3<f64> {
     nalgebra::Rotation3::from_matrix_unchecked(u * d * v_t)
 }
 
-/// How far the product of a matrix with its transpose may be from the identity, by element.
+/// Largest deviation of the product of a matrix with its transpose from the identity, by element.
 pub const ORTHONORMAL_TOLERANCE: f64 = 2e-3;
 
 /// Why a matrix is not a rotation.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum NotARotation {
-    /// Its columns have other lengths or angles.
+    /// Its columns are not orthonormal.
     #[error(
         "its columns are not orthonormal: the largest error of their products is {deviation:.6}, at most {ORTHONORMAL_TOLERANCE}"
     )]
@@ -143,7 +143,7 @@ pub enum NotARotation {
         /// Largest element of the difference.
         deviation: f64,
     },
-    /// Left-handed.
+    /// The matrix is left-handed.
     #[error("it mirrors (determinant −1): check the signs and the handedness")]
     Mirrors,
 }
@@ -151,9 +151,9 @@ pub enum NotARotation {
 /// The rotation of a matrix that is orthonormal to [`ORTHONORMAL_TOLERANCE`]; it is made exact.
 ///
 /// # Errors
-/// [`NotARotation`] for one that is further off, or that mirrors.
+/// [`NotARotation`] for one that deviates more, or that mirrors.
 pub fn rotation_of_matrix(m: &Matrix3<f64>) -> Result<UnitQuaternion<f64>, NotARotation> {
-    // Elements first: products of huge ones are not numbers, and compare as nothing.
+    // Elements first: products of huge ones are NaN, for which comparisons fail.
     let deviation = (m.transpose() * m - Matrix3::identity()).amax();
     if m.amax() > 1.0 + ORTHONORMAL_TOLERANCE || deviation > ORTHONORMAL_TOLERANCE {
         return Err(NotARotation::NotOrthonormal { deviation });

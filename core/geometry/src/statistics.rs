@@ -1,17 +1,17 @@
-//! What is usual among numbers of which a few may be far off.
+//! Typical values of numbers of which a few may be far off.
 
 use statrs::distribution::{ContinuousCDF as _, Normal};
 
 /// Standard deviation of a normal distribution over the median of the sizes of its errors, 1 / Φ⁻¹(3/4).
 pub const SIGMA_PER_MEDIAN_SIZE: f64 = 1.4826;
 
-/// Squared distance of an outlier over that of the farthest view that is none, at the least: it stands twice as far out.
-/// Gaussian errors never do once they are above a limit that makes them rare; where the tail of the distances falls off
-/// as the fifth power only, the farthest does in one session of thirty-two.
+/// Least squared distance of an outlier over that of the farthest inlier: it is twice as far out. Gaussian errors never
+/// are once they are above a limit that makes them rare; where the tail of the distances falls off as the fifth power
+/// only, the farthest is in one session of thirty-two.
 const APART: f64 = 4.0;
 
-/// The median: the number in the middle, or the mean of the two in the middle. What is not a number does not count;
-/// infinities do. `None` where nothing is left.
+/// The median: the number in the middle, or the mean of the two in the middle. NaN does not count; infinities do.
+/// `None` where nothing is left.
 pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let sorted = sorted(values);
     let count = sorted.len();
@@ -25,11 +25,11 @@ pub fn median_high(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     sorted.get(sorted.len() / 2).copied()
 }
 
-/// Which squared distances are outliers: those above `limit` that stand apart, the smallest of them being at least
-/// twice as far as the farthest of the others. By index, ascending.
+/// Which squared distances are outliers: those above `limit` that are separated from the rest, the smallest of them
+/// being at least twice as far as the farthest of the others. By index, ascending.
 ///
-/// A limit alone takes the noise for Gaussian. Errors of an arm that its model misses have longer tails, and then the
-/// far views are the end of a crowd and no outliers; one that is wrong for a reason of its own stands outside of it.
+/// A limit alone assumes Gaussian noise. Unmodelled errors of an arm have longer tails, and then the far views are the
+/// end of a continuous distribution and not outliers; one that is wrong for its own reason is separated from it.
 pub fn outliers(squared: &[f64], limit: f64) -> Vec<usize> {
     let mut order: Vec<usize> = (0..squared.len()).collect();
     order.sort_by(|a, b| squared[*b].total_cmp(&squared[*a]));
@@ -43,8 +43,8 @@ pub fn outliers(squared: &[f64], limit: f64) -> Vec<usize> {
     outliers
 }
 
-/// Degrees of freedom of a variance that is a sum of parts, each proportional to an estimated variance: of every part its
-/// share of the sum, and the degrees of freedom of the estimate. At least one.
+/// Degrees of freedom of a variance that is a sum of parts, each proportional to an estimated variance: given for every
+/// part its share of the sum, and the degrees of freedom of its estimate. At least one.
 ///
 /// # Reference
 /// Satterthwaite 1946, "An approximate distribution of estimates of variance components", Biometrics Bulletin 2; for several
@@ -54,14 +54,15 @@ pub fn pooled_freedom(parts: impl IntoIterator<Item = (f64, f64)>) -> f64 {
     inverse.recip().max(1.0)
 }
 
-/// Numbers up to which the law of [`better_by_chance`] is counted out; for more it is normal to a part in a hundred of its tail.
+/// Count up to which the distribution of [`better_by_chance`] is enumerated; for more it is normal, within one percent of its
+/// tail.
 const COUNTED: usize = 60;
 
-/// Probability that numbers which are as often below zero as above, and of the same sizes there, are as far above zero as these:
-/// the signed-rank test. Zeros do not count.
+/// Probability that numbers distributed symmetrically about zero are as far above zero as these: the signed-rank test. Zeros do
+/// not count.
 ///
-/// It asks for no law of the numbers but that symmetry, and unlike the test of a mean it is not blind to many gains of which a
-/// few are large.
+/// It assumes nothing about their distribution but that symmetry, and unlike the test of a mean it detects many gains of which
+/// a few are large.
 ///
 /// # Reference
 /// Wilcoxon 1945, "Individual comparisons by ranking methods", Biometrics Bulletin 1.
@@ -74,7 +75,7 @@ pub fn better_by_chance(values: &[f64]) -> f64 {
     }
     let below: usize = sizes.iter().enumerate().filter(|(_, value)| **value < 0.0).map(|(rank, _)| rank + 1).sum();
     if count <= COUNTED {
-        // Every choice of ranks is as likely: of how many is the sum as small?
+        // Every choice of ranks is equally likely: this counts those with a sum as small.
         let mut ways = vec![0.0; below + 1];
         ways[0] = 1.0;
         for rank in 1..=count {
@@ -104,7 +105,7 @@ mod tests {
         assert_eq!((median([3.0, 1.0, 2.0]), median_high([3.0, 1.0, 2.0])), (Some(2.0), Some(2.0)));
         assert_eq!((median([4.0, 1.0, 2.0, 3.0]), median_high([4.0, 1.0, 2.0, 3.0])), (Some(2.5), Some(3.0)));
         assert_eq!((median([]), median_high([f64::NAN])), (None, None));
-        // Of either sign, wherever it stands.
+        // NaN of either sign, at any place.
         assert_eq!(median([-f64::NAN, 1.0, f64::NAN, 2.0, f64::INFINITY]), Some(2.0));
     }
 
@@ -119,7 +120,7 @@ mod tests {
             assert!((of_sum(negative) - ways / 1024.0).abs() < 1e-12, "{negative:?}: {}", of_sum(negative));
         }
         assert!((of_sum(&[]) - 2f64.powi(-10)).abs() < 1e-15);
-        // Where it is counted and where it is normal meet.
+        // The enumerated and the normal distribution agree where they meet.
         let mixed = |count: usize| {
             (0..count).map(|k| (k as f64 + 1.0) * if k % 4 == 1 { -1.0 } else { 1.0 }).collect::<Vec<_>>()
         };

@@ -1,4 +1,4 @@
-//! Planes through depths of images that are drawn without the estimator.
+//! Planes through depths of images that are generated without the estimator.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
@@ -22,7 +22,7 @@ fn corners(board: &Isometry3<f64>) -> Vec<Corner> {
     BOARD.points().iter().enumerate().map(corner).collect()
 }
 
-/// Against the third row of the pose that the depths were drawn from, through a lens that bends.
+/// Compared with the third row of the pose that the depths were generated from, through a lens with distortion.
 #[test]
 fn depths_at_the_corners_are_the_third_row_of_the_pose() {
     let stage = Stage::new();
@@ -73,7 +73,7 @@ fn what_covers_a_part_of_the_target_does_not_tilt_it() {
     assert_eq!(DepthPlane::new(&other, (1280, 960), &corners, &BOARD), None, "of an image of another size");
 }
 
-/// Against depths at the same pixels, whose corners were counted otherwise from the start.
+/// Compared with depths at the same pixels, whose corners were numbered differently from the start.
 #[test]
 fn a_plane_counted_from_another_corner_is_that_of_corners_counted_so() {
     let mut stage = Stage::new();

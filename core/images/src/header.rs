@@ -9,7 +9,7 @@ use handeye_wording::{foreign, text};
 
 use super::ImageFileError;
 
-/// Most fields of a TIFF directory that are looked at; cameras write some dozens.
+/// Most fields of a TIFF directory that are read; cameras write a few dozen.
 const MAX_FIELDS: u64 = 10_000;
 
 type Size = (u32, u32);
@@ -96,7 +96,7 @@ fn jpeg(file: &mut (impl Read + Seek)) -> Result<Option<Size>, ImageFileError> {
             }
             // End of the image and start of a scan.
             0xD9 | 0xDA => return Ok(None),
-            // These stand alone.
+            // These markers have no segment.
             0x00 | 0x01 | 0xD0..=0xD8 => {}
             _ => {
                 let length = i64::from(u16::from_be_bytes(bytes(file)?));
@@ -145,7 +145,7 @@ impl<F: Read + Seek> Tiff<'_, F> {
         Ok(if self.big { (self.u64)(bytes(self.file)?) } else { (self.u32)(bytes(self.file)?).into() })
     }
 
-    /// What a field says; `None` when it is no whole number of 32 bits.
+    /// Value of a field; `None` when it is not an integer of 32 bits.
     fn number(&self, kind: u16, [a, b, c, d, e, f, g, h]: [u8; 8]) -> Option<u32> {
         match kind {
             1 => Some(a.into()),

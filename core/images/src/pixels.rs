@@ -100,7 +100,7 @@ fn check_jpeg_is_whole(bytes: &[u8]) -> Result<(), ImageFileError> {
         let marker = next_jpeg_marker(bytes, &mut at).ok_or_else(truncated)?;
         match marker {
             END_OF_IMAGE => return Ok(()),
-            // Start of image, restarts and TEM stand alone.
+            // Start of image, restarts and TEM have no segment.
             0x01 | 0xD0..=0xD8 => {}
             _ => {
                 let length = bytes.get(at..at + 2).ok_or_else(truncated)?;

@@ -1,4 +1,4 @@
-//! Which of the cameras that files describe is taken as known.
+//! Which of the cameras described by files is used.
 
 use super::error::ImportError;
 use super::recording::{FoundCamera, Recording};
@@ -6,9 +6,9 @@ use super::settings::Settings;
 use handeye_wording::Text;
 use handeye_wording::text;
 
-/// The camera that is taken as known for images of this size, and what is to be said of those that are not.
+/// The camera that is used for images of this size, and the warnings about those that are not.
 ///
-/// One that is found alone is taken; of several none is, unless it is named.
+/// A single one is used; of several none is, unless one is named.
 ///
 /// # Errors
 /// [`ImportError::BadChoice`] for a name that there is not.

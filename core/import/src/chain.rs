@@ -13,15 +13,15 @@ use handeye_files::bounds::Bounds;
 use handeye_wording::Text;
 use handeye_wording::text;
 
-/// What ROS calls the joints of Universal Robots, from the base to the tip. Its messages have them in the order of letters.
+/// Joint names of Universal Robots in ROS, from the base to the tip. Messages have them in alphabetical order.
 const ROS_NAMES_OF_UR: [&str; 6] =
     ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"];
 
-/// A recording with poses of the arm in place of joint values. Recorded poses of a robot are no longer among them: who names
-/// the arm wants those of its chain.
+/// A recording with poses of the arm in place of joint values. Recorded poses of a robot are removed: naming the arm selects
+/// those of its chain.
 ///
 /// `arm` is the name of one that is built in, or a URDF file, followed by `,base=LINK` and `,tip=LINK` where the file leaves a
-/// choice. A relative path is looked for from where the program runs, and then in the recording.
+/// choice. A relative path is searched from the working directory, and then in the recording.
 ///
 /// # Errors
 /// [`ImportError::Arm`].
@@ -29,7 +29,7 @@ pub fn with_arm(recording: &Recording, arm: &str) -> Result<Recording, ImportErr
     let fail = |why: Text| ImportError::Arm { arm: arm.to_owned(), why };
     let chain = Chain::of(arm, &recording.root, &recording.bounds).map_err(fail)?;
     let is_of_arm = |series: &JointSeries| chain.row_of(series).is_some();
-    // Joint values by name say what they are; numbers without names are looked at where there are no others.
+    // Joint values with names are unambiguous; numbers without names are used only where there are no others.
     let (named, rows): (Vec<_>, Vec<_>) =
         (recording.joints.iter().collect(), recording.rows.iter().filter(|s| is_of_arm(s)).collect());
     if named.is_empty() && rows.is_empty() {
@@ -65,10 +65,10 @@ pub fn with_arm(recording: &Recording, arm: &str) -> Result<Recording, ImportErr
 }
 
 struct Chain {
-    /// As it is told of.
+    /// Name in messages.
     name: String,
     arm: Arm,
-    /// What files call its joints, from the base to the tip; one of these lists.
+    /// Names of its joints in files, from the base to the tip; one of these lists.
     joint_names: Vec<Vec<String>>,
 }
 
@@ -90,7 +90,7 @@ impl Chain {
                 _ => return Err(text!("“{part}” is neither base=LINK nor tip=LINK", part = part)),
             }
         }
-        // Where files may not be named, it is said of all of them that there are none.
+        // Where files may not be named, all of them are reported as missing.
         let may_be = |path: &PathBuf| bounds.has(path) && path.is_file();
         let path = [Path::new(file).to_path_buf(), root.join(file)].into_iter().find(may_be);
         let Some(path) = path else {
@@ -151,7 +151,7 @@ impl Chain {
         Ok(tracks)
     }
 
-    /// Where the values of the arm stand in rows that have as many, or a number that counts before them.
+    /// Columns of the arm's values, in rows that have as many, or a counter before them.
     fn row_of(&self, series: &JointSeries) -> Option<std::ops::Range<usize>> {
         let count = self.arm.joint_count();
         let first: Vec<f64> = series.samples.iter().filter_map(|sample| sample.values.first().copied()).collect();
@@ -163,7 +163,7 @@ impl Chain {
         }
     }
 
-    /// What is said of values that the arm has no joints for.
+    /// The warning for values that the arm has no joints for.
     fn left_out(&self, series: &JointSeries) -> Option<Text> {
         let (count, has) = (self.arm.joint_count(), series.samples.first()?.values.len());
         let is_open = series.joints.is_empty() && has > count && self.row_of(series).is_none();
@@ -178,7 +178,7 @@ impl Chain {
         })
     }
 
-    /// For every joint of the chain its place among the values: by the names that stand with them, or as they come.
+    /// For every joint of the chain its place among the values: by their names, or in their order.
     fn order(&self, series: &JointSeries) -> Result<Vec<usize>, Text> {
         let count = self.arm.joint_count();
         let has = series.samples.first().map_or(0, |sample| sample.values.len());
@@ -186,7 +186,7 @@ impl Chain {
             if let Some(order) = self.row_of(series) {
                 return Ok(order.collect());
             }
-            // Fingers are told of behind the joints of the arm; as many again would be those of another arm.
+            // Fingers are reported after the joints of the arm; as many again would be those of another arm.
             return if has > count && has < 2 * count {
                 Ok((0..count).collect())
             } else {

@@ -1,4 +1,4 @@
-//! What numbers in files may be: which conventions are left open, and which numbers are no rotation at all.
+//! Possible meanings of numbers in files: which conventions are open, and which numbers cannot be a rotation.
 
 use nalgebra::{Matrix3, Matrix4};
 
@@ -6,9 +6,9 @@ pub use handeye_estimate::diagnose::hypotheses::conventions::{
     AngleUnit, Direction, Euler, LengthUnit, Numbers, Reading, RotationForm,
 };
 
-/// How far from unit length a quaternion, and from orthonormal a matrix, may be: three printed decimals.
+/// Largest deviation of a quaternion from unit length, and of a matrix from orthonormal: three printed decimals.
 pub(super) const UNIT_TOLERANCE: f64 = 5e-3;
-/// No arm reaches farther than this; a larger number is no metre.
+/// No arm reaches farther than this; a larger number is not in metres.
 const FARTHEST_M: f64 = 20.0;
 /// Controllers report angles within two turns.
 const LARGEST_ANGLE_RAD: f64 = 4.0 * std::f64::consts::PI;
@@ -39,7 +39,7 @@ pub(super) fn rigid(numbers: &[f64]) -> Option<Matrix4<f64>> {
     candidates.into_iter().find(is_rigid)
 }
 
-/// Whether a matrix is a rotation with a translation, up to what printing costs.
+/// Whether a matrix is a rotation with a translation, up to the rounding of printed numbers.
 fn is_rigid(m: &Matrix4<f64>) -> bool {
     let last = m.row(3);
     let r = m.fixed_view::<3, 3>(0, 0).into_owned();
@@ -51,7 +51,7 @@ fn is_rigid(m: &Matrix4<f64>) -> bool {
         && is_rotation(&r)
 }
 
-/// Whether nine numbers turn and do not stretch.
+/// Whether nine numbers are a rotation matrix.
 pub(super) fn is_rotation(r: &Matrix3<f64>) -> bool {
     r.iter().all(|v| v.is_finite())
         && (r.transpose() * r - Matrix3::identity()).amax() < 2.0 * UNIT_TOLERANCE

@@ -1,4 +1,4 @@
-//! Recordings of others, of which the conventions are known: which hypothesis comes first, and what it leaves.
+//! Recordings of other projects with known conventions: which hypothesis comes first, and its residual.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ struct Sample {
     settings: &'static [&'static str],
     /// Conventions of the first hypothesis.
     first: &'static [(&'static str, &'static str)],
-    /// What it may leave at the most, millimetres.
+    /// Largest error of the result, millimetres.
     limit_mm: f64,
     verdict: Verdict,
 }
@@ -100,8 +100,8 @@ fn samples() -> Vec<Sample> {
             &[("pose", "tip_from_base"), ("length_unit", "mm"), ("pairing", "row+0")],
             0.2,
         ),
-        // Without a word about where the camera is, both places are listed. No data tell them apart; this rendered board is
-        // nearer to the base than the camera to the tip, as no real one is, and the likelier one is the wrong one.
+        // Where the place of the camera is not given, both are listed. No data distinguish them; this rendered board is
+        // nearer to the base than the camera to the tip, unlike any real one, so the more likely one is wrong.
         Sample {
             files: &["caliban_no_curv/images", "caliban_no_curv/robot_cali.txt"],
             target: Some(board(14, 9, 0.0121)),

@@ -1,4 +1,4 @@
-//! A way to understand a recording, and how well it explains what the camera saw.
+//! An interpretation of a recording, and how well it explains what the camera saw.
 
 use nalgebra::Isometry3;
 
@@ -11,7 +11,7 @@ use handeye_estimate::handeye::Mode;
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_wording::Text;
 
-/// What the poses of the target come from.
+/// Source of the target's poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Source {
     /// The images of a stream, by its place in [`Recording::streams`].
@@ -23,32 +23,32 @@ pub enum Source {
 /// One way to understand a recording.
 #[derive(Debug, Clone)]
 pub struct Hypothesis {
-    /// Where the target is seen.
+    /// Source of the target's poses.
     pub source: Source,
     /// The series of the robot's poses, by its place in [`Recording::tracks`].
     pub robot: usize,
     /// Which image, or which pose of the target, belongs to which pose of the robot.
     pub pairing: Pairing,
-    /// What the robot's numbers mean.
+    /// Meaning of the robot's numbers.
     pub reading: Reading,
-    /// Which way its poses map.
+    /// Direction of its poses.
     pub direction: Direction,
-    /// What the numbers of the target's poses mean, and which way they map; `None` with images.
+    /// Meaning of the numbers of the target's poses, and their direction; `None` with images.
     pub target_reading: Option<(Reading, Direction)>,
-    /// Where the camera sits.
+    /// Where the camera is mounted.
     pub mode: Mode,
-    /// How well it explains the views; `None` where no solution exists.
+    /// Residuals over the views; `None` where no solution exists.
     pub fit: Option<Fit>,
-    /// Other ways to say the same poses.
+    /// Other hypotheses with the same poses.
     pub same_as: Vec<String>,
     /// Why it cannot be right although most views agree: an image that fits the pose of another.
     pub contradictions: Vec<Text>,
 }
 
-/// How well the hand-eye equations hold.
+/// Residuals of the hand-eye equations.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// Median distance between where the poses put the target's outer points and where they were seen, metres.
+    /// Median distance between the target's outer points by the poses and as seen, metres.
     pub median_m: f64,
     /// It over the target's distance from the camera, which is the same in every unit.
     pub relative: f64,
@@ -58,9 +58,9 @@ pub struct Fit {
     pub views: usize,
     /// Poses of the series that disagree with the others, with their misfit in metres.
     pub disagreeing: Vec<(usize, f64)>,
-    /// How far the camera would be from what carries it, metres.
+    /// Resulting distance of the camera from its mount, metres.
     pub camera_at_m: f64,
-    /// How far the target would be from what carries it, metres.
+    /// Resulting distance of the target from its mount, metres.
     pub target_at_m: f64,
 }
 
@@ -85,7 +85,7 @@ impl Hypothesis {
         }
     }
 
-    /// Where the camera sits, as `--set mode=` has it.
+    /// The place of the camera as a value of `--set mode=`.
     pub(crate) fn mode_name(&self) -> &'static str {
         match self.mode {
             Mode::EyeInHand => "eye_in_hand",
@@ -138,7 +138,7 @@ impl Hypothesis {
         out
     }
 
-    /// Whether most views agree with it, well enough for their distance from the camera, and none says that it is wrong.
+    /// Whether most views agree with it, well enough for their distance from the camera, and nothing contradicts it.
     pub fn explains(&self) -> bool {
         let is_near =
             |fit: &Fit| fit.views >= LEAST_POSES && fit.relative < EXPLAINED && fit.median_rad < EXPLAINED_RAD;
@@ -153,7 +153,7 @@ pub struct Convention {
     pub key: &'static str,
     /// Its value there.
     pub value: String,
-    /// What it means, in words.
+    /// Its meaning as text.
     pub means: String,
 }
 

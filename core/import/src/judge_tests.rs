@@ -1,4 +1,4 @@
-//! What a hypothesis is judged by: recordings that look explained and are not, and right ones that look contradicted.
+//! How hypotheses are judged: recordings that seem explained but are not, and correct ones that seem contradicted.
 
 use std::cell::Cell;
 use std::fmt::Write as _;
@@ -34,7 +34,7 @@ fn images(folder: &Path, views: usize) {
     }
 }
 
-/// `calibrateCamera` gives a pose of the target for every image, and many keep those beside the images.
+/// `calibrateCamera` gives a pose of the target for every image, and many users save those next to the images.
 #[test]
 fn poses_of_the_target_in_the_camera_are_no_poses_of_a_robot() {
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
@@ -114,7 +114,8 @@ fn the_same_poses_in_two_files_are_one_hypothesis_that_names_both() {
     assert!(judgement.hypotheses.iter().any(|h| names(h) != names(&judgement.hypotheses[0])));
 }
 
-/// A board that is stated to be a seventh larger than it is leaves a few per cent of its distance, which a poor recording does, too.
+/// A board that is stated to be a seventh larger than it is leaves a few per cent of its distance, which a poor recording does,
+/// too.
 #[test]
 fn a_target_of_another_size_than_the_robot_has_seen_is_named_with_its_size() {
     let reported = |session: &Observations, factor: f64| {
@@ -135,7 +136,7 @@ fn a_target_of_another_size_than_the_robot_has_seen_is_named_with_its_size() {
         let named = why.iter().find_map(|why| why.strip_prefix("a target ")?.split(' ').next());
         let scale: f64 = named.expect("its size").parse().expect("a number");
         assert!((scale * 1.15 - 1.0).abs() < 0.01, "{scale}");
-        // A print that is off by two per cent is for the calibration to find.
+        // A print with a scale error of two per cent is left to the calibration.
         let (_, judgement) = judged(folder.path(), &reported(&session, 1.02), &settings);
         assert_eq!(judgement.verdict, Verdict::Decided, "{:#?}", judgement.hypotheses[0]);
     }
@@ -154,7 +155,8 @@ fn without_a_view_to_solve_with_the_reason_is_said_instead_of_a_list() {
     assert!(matches!(why, Err(ImportError::NoViews { .. })), "{why:?}");
 }
 
-/// No data tell the place of the camera from the direction of the poses: where that is all, it is a question and no list.
+/// No data distinguish the place of the camera from the direction of the poses: where only that is open, it is a question
+/// instead of a list.
 #[test]
 fn a_recording_that_is_clear_but_for_the_place_of_the_camera_says_so() {
     let session = observed(Mode::EyeInHand, VIEWS, 6);
@@ -167,8 +169,8 @@ fn a_recording_that_is_clear_but_for_the_place_of_the_camera_says_so() {
     assert_eq!((judgement.untried, judgement.sources_untried), (0, 0), "a recording is tried wholly");
 }
 
-/// A folder of many series under names that say nothing: with all conventions of either there are more hypotheses than a person
-/// waits for.
+/// A folder of many series under neutral names: with all conventions of each there are more hypotheses than can be tried in
+/// reasonable time.
 #[test]
 fn of_more_hypotheses_than_can_be_tried_the_likeliest_are_and_the_rest_is_counted() {
     let session = observed(Mode::EyeInHand, VIEWS, 7);
@@ -193,8 +195,8 @@ fn of_more_hypotheses_than_can_be_tried_the_likeliest_are_and_the_rest_is_counte
     assert!(judgement.untried > 0);
 }
 
-/// Results of calibrations have matrices, too: of their covariance six rows of six numbers, of several results one after the other
-/// the same two again.
+/// Results of calibrations have matrices, too: the covariance has six rows of six numbers, and several results repeat the same
+/// two.
 #[test]
 fn printed_results_are_no_recording() {
     let session = observed(Mode::EyeInHand, VIEWS, 8);
@@ -259,7 +261,7 @@ fn what_leads_out_of_the_folder_is_not_read_and_reading_ends_in_time() {
     assert!(matches!(why, Err(ImportError::Stopped { why: Spent::Cancelled, .. })), "{why:?}");
 }
 
-/// What tables and texts can be made of to be read for ever: with these lengths, what takes time with their square takes hours.
+/// Tables and texts that are made to take forever to read: with these lengths, quadratic time takes hours.
 #[test]
 fn files_that_are_written_to_take_for_ever_are_read_once() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,4 +1,4 @@
-//! Ways in which repositories keep poses beside images, each told apart from what it may be mistaken for by the data alone.
+//! Ways in which repositories store poses with images, each distinguished by the data alone from similar ones.
 
 use std::fs;
 use std::path::Path;
@@ -222,7 +222,7 @@ fn layouts_of_other_repositories_give_every_image_its_pose() {
     }
 }
 
-/// The two orders of six numbers are one series: neither is the target's beside the other.
+/// The two orders of six numbers are one series: neither is the series of the target for the other.
 #[test]
 fn a_table_alone_is_no_pair_of_series() {
     let session = observed(Mode::EyeInHand, VIEWS, 77);

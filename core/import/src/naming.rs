@@ -22,7 +22,7 @@ impl Naming {
         &self.template
     }
 
-    /// As a person reads it: `#` stands for a number.
+    /// The pattern for people: `#` means a number.
     pub fn shown(&self) -> String {
         self.folder.join(&self.template).display().to_string()
     }
@@ -58,7 +58,7 @@ pub(super) fn naming(path: &Path, with_ending: bool) -> (Naming, Vec<u64>) {
     (Naming { folder, template, runs: numbers.len() }, numbers)
 }
 
-/// What files of one group are called, as a person reads it: `#` stands for a number, also in the names of their folders.
+/// The name pattern of a group of files, for people: `#` means a number, also in the names of their folders.
 pub(super) fn shown<'a>(files: impl IntoIterator<Item = &'a Path>) -> String {
     let mut files = files.into_iter();
     let Some(first) = files.next() else { return String::new() };
@@ -133,15 +133,15 @@ fn across_folders(by_naming: BTreeMap<Naming, Vec<Member>>) -> BTreeMap<Naming, 
     out
 }
 
-/// Which of the numbers of a group counts its files; the first so many are those of folders.
+/// Which of the numbers of a group counts its files; the first `of_folder` are those of folders.
 fn counting(members: &[Member], of_folder: usize) -> Option<usize> {
     let (_, first) = members.first()?;
     let differs = |run: &usize| members.iter().any(|(_, n)| n.get(*run) != first.get(*run));
     let varying: Vec<usize> = (0..first.len()).filter(differs).collect();
-    // Of one file alone the last number is taken, as most programs count at the end.
+    // For a single file the last number is used, as most programs count at the end.
     let [run, others @ ..] = varying.as_slice() else { return first.len().checked_sub(1) };
     let is_same = |other: &usize| members.iter().all(|(_, n)| n.get(*other) == n.get(*run));
-    // The number of a folder may stand in the name of its file again, and the file may have one of its own.
+    // The number of a folder may be repeated in the name of its file, and the file may have one of its own.
     let is_of_folder = *run < of_folder && others.first().is_none_or(|next| *next >= of_folder);
     (is_of_folder || others.iter().all(is_same)).then_some(*run)
 }

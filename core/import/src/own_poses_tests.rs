@@ -117,7 +117,7 @@ fn what_one_camera_of_a_folder_was_given_is_no_robot_for_the_other() {
     assert!(of_right.fit.as_ref().expect("a fit").relative < 0.01 && !of_right.explains(), "{of_right:#?}");
 }
 
-/// A TCP that was calibrated to the camera, a base that was taught on the target: each is what somebody does with an arm.
+/// A TCP that was calibrated to the camera, a base that was taught on the target: each is a usual setup of an arm.
 #[test]
 fn a_robot_with_its_tcp_in_the_camera_or_its_base_on_the_target_is_a_robot() {
     let session = observed(Mode::EyeInHand, VIEWS, 14);
@@ -125,7 +125,7 @@ fn a_robot_with_its_tcp_in_the_camera_or_its_base_on_the_target_is_a_robot() {
     images(folder.path(), "image");
     let poses: Vec<Isometry3<f64>> = (0..VIEWS).map(|view| pose_of(&session, view)).collect();
     table(folder.path(), "poses.txt", &poses, Written::Xyzw);
-    // Where camera and target truly are, by the recording itself.
+    // True places of camera and target, by the recording itself.
     let (_, plain) = judged(folder.path(), &session, &in_hand());
     assert_eq!(plain.verdict, Verdict::Decided);
     let pairs: Vec<_> = seen(folder.path(), &session)

@@ -1,4 +1,4 @@
-//! Which image belongs to which pose: every rule that the names and the order allow, none of them believed.
+//! Which image belongs to which pose: every rule that the names and the order allow, as candidates.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,10 +7,10 @@ use super::folder;
 use super::recording::{ImageFile, Sample};
 use handeye_estimate::diagnose::hypotheses::pairing::{Order, along};
 
-/// A rule, and what it says.
+/// A rule, and the pairs that follow from it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pairing {
-    /// As `--set pairing=` has it.
+    /// Value of `--set pairing=`.
     pub rule: String,
     /// It in words.
     pub text: String,
@@ -55,7 +55,7 @@ pub(super) fn pairings(samples: &[Sample], images: &[ImageFile], need: usize) ->
     out
 }
 
-/// Images by a key; what two images have that are no copies of each other belongs to neither.
+/// Images by a key; a key of two images that are not copies of each other belongs to neither.
 fn keyed<K: Ord>(images: &[ImageFile], key: impl Fn(&ImageFile) -> Option<K>) -> BTreeMap<K, Option<usize>> {
     let mut map: BTreeMap<K, Option<usize>> = BTreeMap::new();
     for (i, image) in images.iter().enumerate() {
@@ -70,7 +70,8 @@ fn keyed<K: Ord>(images: &[ImageFile], key: impl Fn(&ImageFile) -> Option<K>) ->
     map
 }
 
-/// An image belongs to one pose. Of two poses that claim it the first has it when both are equal, and none otherwise.
+/// An image belongs to one pose. Of two poses that claim it the first gets it when both are equal, and neither
+/// otherwise.
 fn settled(samples: &[Sample], mut image_of: Vec<Option<usize>>) -> Vec<Option<usize>> {
     let mut claimed: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for (sample, image) in image_of.iter().enumerate() {

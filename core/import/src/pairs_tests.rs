@@ -1,4 +1,4 @@
-//! Recordings of poses of the robot beside poses of the target or recorded corners, in layouts that say little of themselves.
+//! Recordings of poses of the robot with poses of the target or recorded corners, in layouts with few hints.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -38,7 +38,7 @@ fn judged_alone(path: &Path, settings: &Settings) -> Result<(Recording, Judgemen
 fn is_understood(path: &Path, pairs: &[(Isometry3<f64>, Isometry3<f64>)], what: &str) {
     let (recording, judgement) = judged_alone(path, &in_hand()).unwrap_or_else(|why| panic!("{what}: {why}"));
     let best = &judgement.hypotheses[0];
-    // Both lengths in another unit are the same recording of a smaller cell, which no data tell.
+    // Both lengths in another unit are the same recording of a smaller cell, which no data distinguish.
     let is_said = |h: &&Hypothesis| h.reading.length == LengthUnit::Metre && h.explains();
     let metres = judgement.hypotheses.iter().find(is_said).unwrap_or_else(|| panic!("{what}: {best:#?}"));
     let samples = &recording.tracks[metres.robot].samples;
@@ -105,7 +105,7 @@ fn rows_that_say_what_they_are_of_are_a_series_each() {
         }
         let folder = tempfile::tempdir().expect("a folder");
         fs::write(folder.path().join("session.csv"), text).expect("written");
-        // A printed result is no recording.
+        // A printed result is not a recording.
         fs::write(folder.path().join("result.yaml"), "hand_eye:\n  translation: {x: 0.1, y: 0.2, z: 0.3}\n")
             .expect("written");
         is_understood(folder.path(), &pairs, robot);
@@ -158,7 +158,7 @@ fn a_robot_that_did_not_move_beside_a_target_that_did_is_called_so() {
     assert!(why.contains("the robot did not move"), "{why}");
 }
 
-/// `import log.xml` finds what the file names, and a refusal speaks of the file.
+/// `import log.xml` finds what the file names, and a refusal names the file.
 #[test]
 fn an_xml_that_is_named_finds_its_images_below_and_is_spoken_of() {
     let session = observed(Mode::EyeInHand, VIEWS, 35);

@@ -1,4 +1,4 @@
-//! What was found: images and series of poses, as the files have them.
+//! Images and series of poses as found in the files.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -16,14 +16,14 @@ use handeye_pairs::clock_offset::ClockOffset;
 use handeye_wording::text;
 use handeye_wording::{Text, Value};
 
-/// A recording as it was found. Nothing of it is interpreted yet: numbers stand as they were written.
+/// A recording as it was found. Nothing of it is interpreted yet: numbers are kept as they were written.
 #[derive(Debug, Clone, Default)]
 pub struct Recording {
     /// The folder.
     pub root: PathBuf,
-    /// What its files may name, and whoever chooses what they mean.
+    /// Limits on the files that its files, and the user's choices, may name.
     pub bounds: Bounds,
-    /// What is there and why it is taken for that, one sentence each.
+    /// What was found and how it was recognised, one sentence each.
     pub beliefs: Vec<Text>,
     /// Streams of images: of one naming and one size in one folder, in natural order.
     pub streams: Vec<Stream>,
@@ -31,34 +31,35 @@ pub struct Recording {
     pub tracks: Vec<Track>,
     /// Series of which all poses are the same: settings, or a robot that did not move.
     pub still: Vec<Track>,
-    /// Joint values, of which the chain of the arm makes poses.
+    /// Joint values, which the chain of the arm converts to poses.
     pub joints: Vec<JointSeries>,
-    /// Rows of numbers without names. They are joint values only for whoever names the arm.
+    /// Rows of numbers without names. They are joint values only where the user names the arm.
     pub rows: Vec<JointSeries>,
     /// Poses of a robot that moves, as densely as they were recorded: what images of a stream with stamps are given poses of
     /// ([`timed`](super::timed)).
     pub motions: Vec<Motion>,
-    /// Poses where a moving robot stood, too few to be taken where the motion tells more: what is left where its clock cannot be
-    /// related to that of the images.
+    /// Poses at which a moving robot was at rest, too few to be preferred to the motion: used where its clock cannot be related
+    /// to that of the images.
     pub at_rest: Vec<Track>,
-    /// How far clocks are apart, where poses were given to images by their stamps.
+    /// Offsets between clocks, where poses were assigned to images by their timestamps.
     pub clocks: Vec<Clocks>,
     /// Cameras that files describe.
     pub cameras: Vec<FoundCamera>,
     /// Targets that files describe.
     pub targets: Vec<FoundTarget>,
-    /// Where the camera sits, when a file says so, and which one.
+    /// Where the camera is mounted, when a file states it, and that file.
     pub mode: Option<FoundMode>,
     /// Where no series was found, what the files have instead, one sentence each.
     pub nothing: Vec<Text>,
-    /// What a person should know of the files: doubled ones, some that cannot be read.
+    /// Warnings about the files for the user: duplicates, some that cannot be read.
     pub warnings: Vec<Text>,
-    /// Where images lie that were unpacked; they go with the recording.
+    /// Folders of unpacked images; deleted with the recording.
     pub scratch: Vec<Arc<TempDir>>,
 }
 
 impl Recording {
-    /// Whether the images of a stream, by its place, are photographs. Those of 16 bits of grey are depths where there are others.
+    /// Whether the images of a stream, by its index, are photographs. Those of 16 bits of grey are depth images where there are
+    /// others.
     pub fn has_photographs(&self, stream: usize) -> bool {
         let is_depth = |stream: &Stream| stream.is_depth && stream.points.is_none();
         self.streams.get(stream).is_some_and(|it| it.points.is_none())
@@ -74,7 +75,7 @@ impl Recording {
 /// Images of one naming in one folder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stream {
-    /// As `--set images=` names it.
+    /// Value of `--set images=`.
     pub name: String,
     /// In natural order.
     pub images: Vec<ImageFile>,
@@ -83,12 +84,12 @@ pub struct Stream {
     /// One channel of 16 bits: depth, where there are other images.
     pub is_depth: bool,
     /// In the place of images, points of the target that another program has found in each, in the order of the file; the size is
-    /// (0, 0) where no file says it. `images` are then the files or entries that they are from.
+    /// (0, 0) where no file states it. `images` are then the files or entries that they are from.
     pub points: Option<Vec<Option<Vec<[f64; 2]>>>>,
 }
 
 impl Stream {
-    /// What it is, in words.
+    /// Description as text.
     pub fn text(&self) -> Text {
         let (width, height) = self.size;
         let size = if self.size == (0, 0) {
@@ -123,7 +124,7 @@ impl Stream {
 /// An image of a recording, as a file or out of a bag.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ImageFile {
-    /// Where it is, below the folder of the recording; of one that was unpacked as a whole.
+    /// Path below the folder of the recording; absolute for one that was unpacked.
     pub path: PathBuf,
     /// The number in its name that differs from image to image.
     pub number: Option<u64>,
@@ -140,12 +141,12 @@ impl ImageFile {
     }
 }
 
-/// What the poses of a series are of.
+/// What the poses of a series belong to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// Of the robot, by its name or because there is nothing else.
+    /// The robot, by its name or because there is no other series.
     Robot,
-    /// Of the target as seen by the camera.
+    /// The target as seen by the camera.
     Target,
     /// Either.
     Unknown,
@@ -154,11 +155,11 @@ pub enum Role {
 /// A series of poses.
 #[derive(Debug, Clone)]
 pub struct Track {
-    /// As `--set poses=` names it.
+    /// Value of `--set poses=`.
     pub name: String,
-    /// What they are of.
+    /// What the poses belong to.
     pub role: Role,
-    /// What the file says of its conventions.
+    /// Conventions that the file states.
     pub stated: Stated,
     /// The series of which it is another reading: the same numbers in another order.
     pub reading_of: Option<String>,
@@ -172,7 +173,7 @@ impl Track {
         self.samples.windows(2).all(|pair| pair[0].numbers == pair[1].numbers)
     }
 
-    /// What it is, in words.
+    /// Description as text.
     pub fn text(&self) -> Text {
         let joints = self.samples.iter().filter(|sample| !sample.joints.is_empty()).count();
         let kind = match self.samples.first().map(|sample| sample.numbers) {
@@ -199,29 +200,29 @@ pub struct Sample {
     pub image: Option<String>,
     /// Its number in the file, or the number of its file.
     pub number: Option<u64>,
-    /// Where it stands, for messages: file and row. A row that may be read in several ways has one for all of them.
+    /// Place for messages: file and row. A row that may be read in several ways has one for all of them.
     pub place: Arc<Text>,
     /// The numbers of the pose as they are written down.
     pub numbers: Numbers,
-    /// Joint values that stand with it, in the unit of the file.
+    /// Joint values next to it, in the unit of the file.
     pub joints: Vec<f64>,
 }
 
 /// A series of joint values.
 #[derive(Debug, Clone)]
 pub struct JointSeries {
-    /// As it is told of.
+    /// Name in messages.
     pub name: String,
     /// Names of the joints in the order of the values, where they are stated.
     pub joints: Vec<String>,
-    /// Of the values of revolute joints, where it is stated.
+    /// Unit of the values of revolute joints, where it is stated.
     pub unit: Option<Known<AngleUnit>>,
-    /// In the order of the file.
+    /// The samples in the order of the file.
     pub samples: Vec<JointSample>,
 }
 
 impl JointSeries {
-    /// What it is, in words.
+    /// Description as text.
     pub(crate) fn text(&self) -> Text {
         let names = if self.joints.is_empty() { String::new() } else { format!(" ({})", self.joints.join(", ")) };
         text!(
@@ -236,31 +237,31 @@ impl JointSeries {
 /// Poses of a robot that moves.
 #[derive(Debug, Clone)]
 pub struct Motion {
-    /// As `--set poses=` names the series that is made of it.
+    /// Value of `--set poses=` for the series that is made from it.
     pub name: String,
-    /// What they are of.
+    /// What the poses belong to.
     pub role: Role,
-    /// Which way they map, where it is known.
+    /// Direction of the poses, where it is known.
     pub direction: Option<Known<Direction>>,
-    /// By the robot's clock in nanoseconds, rising; metres.
+    /// Time on the robot's clock in nanoseconds, increasing, and pose in metres.
     pub poses: Arc<Vec<(i64, Isometry3<f64>)>>,
 }
 
-/// How far the clock of a camera and that of a robot are apart.
+/// Offset between the clock of a camera and that of a robot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clocks {
     /// Name of the series of images.
     pub images: String,
     /// The robot's poses.
     pub poses: String,
-    /// What is added to stamps of the images to have them by the robot's clock.
+    /// Added to timestamps of the images to convert them to the robot's clock.
     pub offset: ClockOffset,
-    /// Images that say so.
+    /// Number of images used.
     pub count: usize,
 }
 
 impl Clocks {
-    /// How far they are apart.
+    /// The offset as text.
     pub fn text(&self) -> Text {
         let (offset_ms, sigma_ms) = (self.offset.offset_s * 1e3, self.offset.sigma_s * 1e3);
         // Two digits of the standard deviation, and no more of the offset.
@@ -283,24 +284,24 @@ pub struct JointSample {
     pub image: Option<String>,
     /// Their number in the file, or the number of their file.
     pub number: Option<u64>,
-    /// Where they stand, for messages.
+    /// Place for messages.
     pub place: Arc<Text>,
     /// The joint values of a row, in the unit of the file.
     pub values: Vec<f64>,
 }
 
-/// What a file says of the conventions of a series, and how it is known. `None`: not stated.
+/// Conventions of a series that a file states, and how they are known. `None`: not stated.
 #[derive(Debug, Clone, Default)]
 pub struct Stated {
     /// The unit of positions.
     pub length: Option<Known<LengthUnit>>,
     /// The unit of angles.
     pub angle: Option<Known<AngleUnit>>,
-    /// Of rotations: the ones that are left open by what is known.
+    /// Conventions of rotations that are still possible.
     pub rotation: Option<Known<Vec<RotationForm>>>,
-    /// Which way it maps.
+    /// Direction of the poses.
     pub direction: Option<Known<Direction>>,
-    /// Of the direction with the place of the camera, where one follows from the other.
+    /// Direction for each place of the camera, where one follows from the other.
     pub direction_in: Option<Known<[(Mode, Direction); 2]>>,
 }
 
@@ -309,30 +310,30 @@ pub struct Stated {
 pub struct Known<T> {
     /// The fact.
     pub value: T,
-    /// Who says so.
+    /// Source of the fact.
     pub why: String,
 }
 
 impl<T> Known<T> {
-    /// By whom.
+    /// A fact with its source.
     pub(crate) fn by(why: impl Into<String>, value: T) -> Self {
         Self { value, why: why.into() }
     }
 }
 
-/// Where the camera sits, as a file says it.
+/// Where the camera is mounted, as a file states it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FoundMode {
     /// Eye in hand or eye to hand.
     pub value: Mode,
-    /// By what the file says it.
+    /// The key in the file that states it.
     pub key: &'static str,
-    /// The file that says so.
+    /// The file that states it.
     pub file: String,
 }
 
 impl FoundMode {
-    /// Who says so.
+    /// Source of the fact.
     pub(crate) fn why(&self) -> Text {
         text!("{key} in {file}", key = self.key, file = &self.file)
     }
@@ -343,14 +344,14 @@ impl FoundMode {
 pub struct FoundTarget {
     /// The target with its sizes in metres.
     pub target: TargetSpec,
-    /// The file that says so.
+    /// The file that describes it.
     pub file: String,
-    /// It is a tag and the file does not say which of its family: the images have to.
+    /// It is a tag and the file does not state its id: that is read from the images.
     pub is_id_open: bool,
 }
 
 impl FoundTarget {
-    /// What it is, in words.
+    /// Description as text.
     pub(crate) fn text(&self) -> Text {
         let open = if self.is_id_open { text!(", which number of its family is not said") } else { Text::default() };
         text!("a target in {file}: {target}{open}", file = &self.file, target = self.target.text(), open = open)
@@ -362,14 +363,14 @@ impl FoundTarget {
 pub struct FoundCamera {
     /// The file, as `--set camera=` names it.
     pub name: String,
-    /// It. Width and height are 0 where the file does not say them.
+    /// The intrinsics. Width and height are 0 where the file does not state them.
     pub intrinsics: Intrinsics,
-    /// What kind of file it is.
+    /// Kind of file.
     pub why: &'static str,
 }
 
 impl FoundCamera {
-    /// What it is, in words.
+    /// Description as text.
     pub(crate) fn text(&self) -> Text {
         text!("a camera in {file}: {why}", file = &self.name, why = Value::phrase(self.why))
     }

@@ -1,4 +1,4 @@
-//! What the camera saw of the target, before anything is said of the robot.
+//! Views of the target by the camera, independent of the robot.
 
 use nalgebra::{Isometry3, Matrix6, Point3};
 
@@ -62,7 +62,7 @@ impl Sight {
     /// From points that another program has found; the size of the images is stated by the files or by a person.
     ///
     /// # Errors
-    /// A sentence, where nobody says the size, the points are not those of the target, or give no poses.
+    /// A sentence, where the size is not known, the points are not those of the target, or give no poses.
     pub fn of_points(
         target: TargetSpec,
         stream: &Stream,
@@ -74,7 +74,7 @@ impl Sight {
         Self::of_corners(target, size, camera, &corners)
     }
 
-    /// Of some of the images, by their places.
+    /// The views of some of the images, by their indices.
     pub(super) fn of_images(&self, kept: &[usize]) -> Self {
         let seen = kept.iter().map(|image| self.seen[*image]).collect();
         let covariances = kept.iter().filter_map(|image| self.covariances.get(*image).copied()).collect();
@@ -83,7 +83,7 @@ impl Sight {
 
     /// From recorded poses of the target, metres.
     pub(crate) fn of_poses(target: Option<&TargetSpec>, seen: Vec<Option<Isometry3<f64>>>) -> Self {
-        // Without a target points at arm's length of a hand around its origin say how far poses are apart.
+        // Without a target, points within this distance of its origin measure how far poses are apart.
         const REACH_M: f64 = 0.05;
         let outer = match target {
             Some(target) => {
@@ -111,10 +111,10 @@ pub(super) fn recorded_corners(stream: &Stream, target: &TargetSpec) -> Result<V
     numbered.map(|view| Ok(view?.map(Corners::from))).collect()
 }
 
-/// The size of the images that points are from, as a person or the files say it.
+/// The size of the images that points are from, as the user or the files state it.
 ///
 /// # Errors
-/// A sentence, where neither does, or points are beside the image.
+/// A sentence, where neither does, or points are outside of the image.
 pub fn size_of_points(stream: &Stream, reported: Option<(u32, u32)>) -> Result<(u32, u32), Text> {
     let size = reported.or((stream.size != (0, 0)).then_some(stream.size));
     let (width, height) = size.ok_or_else(|| {

@@ -1,5 +1,5 @@
-//! Whole recordings, simulated, in many forms and with many things wrong. Each image says by its first pixel which view it is
-//! of, so that it is known whatever it is called.
+//! Whole recordings, simulated, in many forms and with many defects. The first pixel of each image encodes its view, so that
+//! it is known whatever the name of the file is.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -42,7 +42,7 @@ fn view_of(path: &Path) -> usize {
     usize::from(handeye_images::load_gray(path).expect("an image").get_pixel(0, 0).0[0])
 }
 
-/// What the camera saw in the images that are there.
+/// Views of the target in the existing images.
 pub(super) fn sights(recording: &Recording, session: &Observations) -> Sights {
     let CameraKnowledge::Fixed(camera) = session.camera else { panic!("the camera is known") };
     let of = |stream: &Stream| {
@@ -63,7 +63,7 @@ pub(super) fn judged(folder: &Path, session: &Observations, settings: &Settings)
     (recording, judgement)
 }
 
-/// What is known where the target was given, the camera was not, and nobody chose a hypothesis.
+/// What is known where the target was given, the camera was not, and no hypothesis was chosen.
 pub(super) fn known<'a>(
     recording: &'a Recording,
     judgement: &'a Judgement,
@@ -277,7 +277,7 @@ fn pose_pairs_without_images_are_understood_from_their_names_alone() {
     assert_ne!(judgement.verdict, Verdict::Unexplained);
 }
 
-/// What may have happened to a folder.
+/// Damage to a folder.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Happened {
     Nothing,
@@ -311,7 +311,7 @@ const HAPPENED: [Happened; 13] = [
     Happened::RowAndImageMissing,
 ];
 
-/// How poses say which image they belong to.
+/// How poses are linked to images.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Link {
     Order,
@@ -326,7 +326,7 @@ fn happened_folder(session: &Observations, what: Happened, link: Link, rng: &mut
     let count = session.views.len();
     let first = rng.random_range(0..3);
     let mut name: Vec<String> = (0..count).map(|view| format!("shot_{}", view + first)).collect();
-    // The order in which rows stand, and names under which files lie.
+    // The order of the rows, and the names of the files.
     let mut rows: Vec<usize> = (0..count).collect();
     let mut files: Vec<(usize, String)> = name.iter().cloned().enumerate().collect();
     if link == Link::Names {
@@ -401,7 +401,7 @@ fn happened_folder(session: &Observations, what: Happened, link: Link, rng: &mut
     folder
 }
 
-/// How many of these folders were paired rightly without a word, and how many were listed or refused.
+/// Number of these folders that were paired correctly without a question, and of those that were listed or refused.
 fn damaged_folders(seeds: std::ops::Range<u64>) -> (usize, usize) {
     let (mut right, mut refused) = (0, 0);
     for seed in seeds {
@@ -412,7 +412,7 @@ fn damaged_folders(seeds: std::ops::Range<u64>) -> (usize, usize) {
         let folder = happened_folder(&session, what, link, &mut rng);
         let (recording, judgement) = judged(folder.path(), &session, &in_hand());
         let best = &judgement.hypotheses[0];
-        // What is written without a word, and what `--take best` writes.
+        // What is written without a question, and what `--take best` writes.
         if judgement.verdict == Verdict::Unexplained {
             refused += 1;
             let is_harmless = matches!(what, Happened::Nothing | Happened::Padded);

@@ -1,5 +1,5 @@
-//! Poses of a moving robot at the times of images: how far the clocks of the two are apart is estimated from what both saw of
-//! the motion, and refused where that does not tell.
+//! Poses of a moving robot at the times of images: the offset of the two clocks is estimated from the motion that both
+//! observed, and refused where it is not determined.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -32,12 +32,13 @@ const SPEED_S: f64 = 0.02;
 
 /// Gives images of a moving robot their poses, and keeps of the images those in which the robot was slowest.
 ///
-/// Where the offset of the clocks cannot be told, the images at which the robot stood are kept, if there are three and more.
+/// Where the offset of the clocks cannot be determined, the images at which the robot was at rest are kept, if there are at
+/// least three.
 ///
 /// `None` where no stream has stamps; `sights` are those of the recording that comes back.
 ///
 /// # Errors
-/// [`ImportError::Clocks`] where the offset of the clocks cannot be told and the robot hardly stood.
+/// [`ImportError::Clocks`] where the offset of the clocks cannot be determined and the robot was hardly at rest.
 pub fn timed(
     recording: &Recording,
     sights: &mut Sights,
@@ -67,7 +68,7 @@ pub fn timed(
             }
         }
         let Some((motion, offset)) = found.first() else {
-            // Without a robot there is nothing to be timed by, which is reported later.
+            // Without a robot there is no time reference, which is reported later.
             let Some(refusal) = refusal else { continue };
             if !stood(recording, &mut out, sights, i, &refusal) {
                 return Err(refusal);
@@ -92,7 +93,7 @@ pub fn timed(
     Ok(is_timed.then_some(out))
 }
 
-/// Keeps of a stream the images at which the robot stood, with their poses; whether there are enough.
+/// Keeps the images of a stream at which the robot was at rest, with their poses; returns whether there are enough.
 fn stood(recording: &Recording, out: &mut Recording, sights: &mut Sights, i: usize, refusal: &ImportError) -> bool {
     let stream = &recording.streams[i];
     let Some(sight) = sights.streams.get(i).and_then(Option::as_ref) else { return false };
@@ -123,7 +124,8 @@ fn stood(recording: &Recording, out: &mut Recording, sights: &mut Sights, i: usi
     true
 }
 
-/// An image in which the target was seen: its place in the stream, its time in seconds after the first image, what was seen.
+/// An image in which the target was seen: its place in the stream, its time in seconds after the first image, the pose of
+/// the target.
 type Seen = (usize, f64, Isometry3<f64>);
 
 fn seen(stream: &Stream, sight: &Sight, first_ns: i64) -> Vec<Seen> {
@@ -192,7 +194,7 @@ fn stated(
     }
 }
 
-/// The inverse of what was recorded is what the mount does where the camera stands beside the robot.
+/// With the camera next to the robot (eye to hand), the mount moves by the inverse of the recorded poses.
 fn classes(motion: &Motion, settings: &Settings) -> Vec<Direction> {
     let direction = settings.direction.or(motion.direction.as_ref().map(|known| known.value));
     match settings.mode.zip(direction) {
@@ -201,8 +203,8 @@ fn classes(motion: &Motion, settings: &Settings) -> Vec<Direction> {
     }
 }
 
-/// Of every part of the recording the image in which the robot was slowest: the least blurred, and the one that an error of
-/// the clocks matters least to.
+/// The image in every part of the recording in which the robot was slowest: the least blurred, and the least sensitive to
+/// an error of the clocks.
 fn slowest(seen: &[Seen], robot: &[(f64, Pose<Anchor, Mount>)], offset: &ClockOffset, distance_m: f64) -> Vec<usize> {
     let speed = |(index, time_s, _): &Seen| -> Option<(f64, usize)> {
         let at = |by_s: f64| pose_at(robot, time_s + offset.offset_s + by_s);

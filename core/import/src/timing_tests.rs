@@ -6,7 +6,7 @@ use handeye_estimate::handeye::Mode;
 use handeye_geometry::targets::{Grid, TargetSpec};
 
 const OFFSET_S: f64 = 0.0437;
-/// As stamps of 2023 are.
+/// As in timestamps of 2023.
 const START_NS: i64 = 1_700_000_000_000_000_000;
 
 fn arm(time_s: f64) -> Isometry3<f64> {
@@ -16,7 +16,7 @@ fn arm(time_s: f64) -> Isometry3<f64> {
     Isometry3::new(Vector3::new(0.4 + 0.2 * of(0), 0.2 * of(1), 0.5 + 0.2 * of(2)), Vector3::new(of(3), of(4), of(5)))
 }
 
-/// A robot at 100 Hz and a camera at 15 Hz whose clock is behind, in hand or beside the robot.
+/// A robot at 100 Hz and a camera at 15 Hz whose clock is behind, in hand or next to the robot.
 fn recorded(mode: Mode, seconds: f64, moves: impl Fn(f64) -> Isometry3<f64>) -> (Recording, Sights) {
     let x = Isometry3::new(Vector3::new(0.03, -0.05, 0.08), Vector3::new(0.2, -0.3, 1.5));
     let y = Isometry3::new(Vector3::new(0.9, 0.1, 0.1), Vector3::new(1.0, 2.0, 0.5));
@@ -96,7 +96,7 @@ fn a_motion_that_tells_no_time_is_refused() {
     assert!(matches!(refused, Err(ImportError::Clocks { .. })), "{refused:?}");
 }
 
-/// It turned evenly, which tells no time, and stood five times.
+/// It turned evenly, which does not determine an offset, and was at rest five times.
 #[test]
 fn where_the_motion_tells_no_time_the_images_at_rest_are_kept() {
     let even = |time_s: f64| Isometry3::new(Vector3::new(0.4, 0.0, 0.5), Vector3::new(0.0, 0.0, 0.2 * time_s));

@@ -19,7 +19,7 @@ pub(super) const MAX_VALUES: usize = 1_000_000;
 /// A value of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Value {
-    /// Nothing, or what an alias stands for: what no pose is made of.
+    /// Null or an alias: not part of a pose.
     Other,
     Flag(bool),
     Number(f64),
@@ -81,8 +81,8 @@ impl Value {
         (!numbers.is_empty()).then_some(numbers)
     }
 
-    /// The rows of a matrix as OpenCV writes it that is a table, with the channels of an entry beside each other; of four rows or
-    /// fewer it is one by itself.
+    /// The rows of a matrix as OpenCV writes it that is a table, with the channels of an entry in adjacent columns; up to four
+    /// rows are a single matrix.
     pub fn matrix_rows(&self) -> Option<Value> {
         const MOST_ROWS_OF_A_MATRIX: u64 = 4;
         let rows = self.get("rows")?.whole().filter(|rows| *rows > MOST_ROWS_OF_A_MATRIX)?;
@@ -106,7 +106,7 @@ fn collect(value: &Value, most: usize, numbers: &mut Vec<f64>) -> Option<()> {
     }
 }
 
-/// Reads JSON; several values one after the other, as a line to a record, are a list.
+/// Reads JSON; several consecutive values, for example one record per line, are a list.
 pub(super) fn json(text: &str) -> Result<Value, Text> {
     let mut left = MAX_VALUES;
     let mut values = Vec::new();
@@ -146,7 +146,7 @@ impl<'de> Deserialize<'de> for Record {
     }
 }
 
-/// Reads a value of JSON at some depth, of so many that are left.
+/// Reads a value of JSON at some depth, with a limit on the values.
 #[derive(Clone, Copy)]
 struct Json<'a> {
     depth: usize,
@@ -228,8 +228,8 @@ fn too_deep() -> Text {
     text!("is nested more than {most} levels deep", most = MAX_DEPTH)
 }
 
-/// Reads YAML: the documents of a file, one after the other. Tags are ignored; an alias stands for nothing, so that no
-/// file grows when it is read.
+/// Reads YAML: the documents of a file, one after the other. Tags are ignored; an alias is ignored, so that no file
+/// grows when it is read.
 pub(super) fn yaml(text: &str) -> Result<Vec<Value>, Text> {
     // OpenCV writes a first line that no version of YAML allows: `%YAML:1.0`.
     let text = match text.strip_prefix("%YAML:") {
@@ -279,7 +279,7 @@ pub(super) fn yaml(text: &str) -> Result<Vec<Value>, Text> {
     Ok(documents)
 }
 
-/// What is being read.
+/// The collection that is being read.
 enum Open {
     List(Vec<Value>),
     /// And the key whose value comes next.

@@ -1,4 +1,4 @@
-//! A recording, understood, as a dataset folder. Comments in `dataset.toml` say where each convention comes from.
+//! An interpreted recording as a dataset folder. Comments in `dataset.toml` state the source of each convention.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -33,7 +33,7 @@ const CORNERS: &str = "corners.csv";
 /// Folder of the images.
 const IMAGES: &str = "images";
 
-/// What is written, all of it known before the first file is.
+/// Everything to write, complete before the first file is written.
 #[derive(Debug, Clone)]
 pub struct Plan {
     /// The text of `dataset.toml`.
@@ -42,7 +42,7 @@ pub struct Plan {
     pub poses: Option<String>,
     /// The text of `target_poses.csv`, where there are no images.
     pub target_poses: Option<String>,
-    /// The text of `corners.csv`, where recorded corners stand for images.
+    /// The text of `corners.csv`, where recorded corners replace images.
     pub corners: Option<String>,
     /// Images to copy, and their names in the data set.
     pub images: Vec<(PathBuf, String)>,
@@ -52,19 +52,19 @@ pub struct Plan {
     pub left_out: Vec<String>,
 }
 
-/// What goes into a plan beside the hypothesis.
+/// Input of a plan in addition to the hypothesis.
 pub struct Context<'a> {
     /// The recording that is written as a data set.
     pub recording: &'a Recording,
     /// All that was tried.
     pub judgement: &'a Judgement,
-    /// What a person fixed.
+    /// Choices of the user.
     pub settings: &'a Settings,
     /// The target; `None` where only its poses are known.
     pub target: Option<(TargetSpec, String)>,
     /// The camera, where one is taken as known.
     pub camera: Option<FoundCamera>,
-    /// Whether a person has taken this hypothesis out of several.
+    /// Whether the user has selected this hypothesis out of several.
     pub is_taken: bool,
 }
 
@@ -196,9 +196,9 @@ pub fn plan(h: &Hypothesis, known: &Context<'_>, link_to: Option<&Path>) -> Plan
     }
 }
 
-/// Plans the folder of images alone, to calibrate the camera by itself: those that a person named, or else those of the stream
-/// that has most; what is not taken is reported. A lens that files describe is where the estimate starts, with its model. `None` where
-/// there are no images; depth images are none.
+/// Plans the folder of images alone, to calibrate the camera by itself: those that the user named, or else those of the stream that
+/// has most; what is not taken is reported. A lens that files describe is where the estimate starts, with its model. `None` where
+/// there are no images; depth images do not count.
 pub fn plan_images(recording: &Recording, settings: &Settings, target: &(TargetSpec, String)) -> Option<Plan> {
     let photographs = (0..recording.streams.len()).filter(|i| recording.has_photographs(*i));
     let streams: Vec<&Stream> = photographs.map(|i| &recording.streams[i]).collect();
@@ -230,7 +230,7 @@ pub fn plan_images(recording: &Recording, settings: &Settings, target: &(TargetS
     Some(Plan { description: text, poses: None, target_poses: None, corners: None, images, views, left_out })
 }
 
-/// Corners that stand for images, and the size of those.
+/// Corners that replace images, and the image size.
 struct RecordedCorners {
     views: Vec<Option<Corners>>,
     columns: usize,
@@ -242,7 +242,7 @@ impl RecordedCorners {
         let Source::Stream(i) = h.source else { return None };
         let stream = known.recording.streams.get(i).filter(|stream| stream.points.is_some())?;
         let (target, _) = known.target.as_ref()?;
-        // Whoever has this hypothesis has looked at them.
+        // With this hypothesis they were read already.
         let views = recorded_corners(stream, target).ok()?;
         let size = size_of_points(stream, known.settings.image_size).ok()?;
         Some(Self { views, columns: target.grid().columns, size })
@@ -260,7 +260,7 @@ impl RecordedCorners {
     }
 }
 
-/// Stands for a target of which only the poses are known.
+/// Replaces a target of which only the poses are known.
 const PLACEHOLDER: TargetSpec =
     TargetSpec::AprilTag(AprilTag { tag_m: 0.1, id: 0, family: Dictionary::APRILTAG_36H11, border_bits: None });
 
@@ -279,7 +279,7 @@ struct Names<'a> {
 }
 
 impl Names<'_> {
-    /// Where it is as seen from the data set, if it stays there. What was unpacked does not.
+    /// Path relative to the data set, if the file stays where it is. Unpacked files do not.
     fn linked(&self, path: &Path) -> Option<String> {
         self.link_to.filter(|_| path.is_relative()).and_then(|folder| relative(&self.root.join(path), folder))
     }
@@ -288,7 +288,7 @@ impl Names<'_> {
         let ending = path.extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
         let file = path.file_name().and_then(|name| name.to_str());
         let whole = path.to_str().map(|path| path.replace(['/', '\\'], "_"));
-        // Of two folders the files may have the same names, and a name may be no text.
+        // Files of two folders may have the same names, and a name may not be valid text.
         let candidates = [file.map(str::to_owned), whole, Some(format!("image_{:05}.{ending}", index + 1))];
         let free = candidates.into_iter().flatten().find(|name| !self.taken.contains(&name.to_lowercase()));
         let name = free.unwrap_or_else(|| format!("image_{:05}_{}.{ending}", index + 1, self.taken.len()));
@@ -297,7 +297,7 @@ impl Names<'_> {
     }
 }
 
-/// A path as seen from a folder; `None` where there is none, or it is no text.
+/// A path relative to a folder; `None` where there is none, or it is not valid text.
 fn relative(path: &Path, folder: &Path) -> Option<String> {
     let path = path.canonicalize().ok()?;
     let folder = folder.canonicalize().ok()?;
@@ -311,7 +311,7 @@ fn relative(path: &Path, folder: &Path) -> Option<String> {
 }
 
 fn comment(text: &mut String, line: impl std::fmt::Display) {
-    // What a comment says stands on one line, whatever a file is called. Writing to a string cannot fail.
+    // A comment is on one line, whatever the name of a file is. Writing to a string cannot fail.
     let line = one_line(&line).replace(char::is_control, " ");
     let _ok = writeln!(text, "# {line}").is_ok();
 }
@@ -386,7 +386,7 @@ pub fn provenance(key: &str, value: &str, h: &Hypothesis, known: &Context<'_>) -
     if let Some(why) = stated(key, h, known.recording) {
         return why;
     }
-    // What each leaves over the target's distance, and in words.
+    // The residual of each relative to the target's distance, and as text.
     let left = |h: &Hypothesis| h.fit.as_ref().map(|fit| (fit.relative, format!("{:.2} mm", fit.median_m * 1e3)));
     let (own, own_said) = left(h).unwrap_or((f64::INFINITY, "nothing".into()));
     let other = known.judgement.hypotheses.iter().filter_map(|other| {
@@ -407,7 +407,7 @@ pub fn provenance(key: &str, value: &str, h: &Hypothesis, known: &Context<'_>) -
     }
 }
 
-/// What files say of a convention.
+/// Conventions that files state.
 pub(super) fn stated(key: &str, h: &Hypothesis, recording: &Recording) -> Option<String> {
     let robot = &recording.tracks[h.robot].stated;
     let target = match h.source {
@@ -441,7 +441,7 @@ fn is_robots(track: &Track) -> bool {
 
 /// Writes a plan into a new or empty folder. `progress` is called with how many images of how many are written.
 ///
-/// `dataset.toml` comes last, so that what was interrupted is no data set.
+/// `dataset.toml` comes last, so that an interrupted import is not a data set.
 ///
 /// # Errors
 /// [`ImportError::OutNotEmpty`], [`ImportError::Unwritable`], [`ImportError::Unreadable`] for an image.
@@ -475,7 +475,7 @@ pub fn write(plan: &Plan, out: &Path, mut progress: impl FnMut(usize, usize)) ->
     put(DESCRIPTION, plan.description.as_bytes())
 }
 
-/// Refuses a folder that something is in, and one that is reached through a link in somebody's data.
+/// Refuses a folder that is not empty, and one that is reached through a link in a user's data.
 ///
 /// # Errors
 /// As [`write`](fn@write).

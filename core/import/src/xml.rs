@@ -1,5 +1,5 @@
-//! XML as a tree: OpenCV's storage, and that of programs that nobody knows, with elements and attributes as fields and what stands
-//! again and again as a list.
+//! XML as a tree: OpenCV's storage, and that of unknown programs, with elements and attributes as fields and repeated elements as
+//! a list.
 
 use super::value::{MAX_DEPTH, MAX_VALUES, Value, number};
 
@@ -23,7 +23,7 @@ fn parsed(text: &str) -> Result<roxmltree::Document<'_>, String> {
     roxmltree::Document::parse_with_options(text, options).map_err(|e| e.to_string())
 }
 
-/// The values of OpenCV's storage in XML; `None` where it is none.
+/// The values of OpenCV's storage in XML; `None` where it is not one.
 pub(super) fn opencv(text: &str) -> Option<Value> {
     let document = parsed(text).ok()?;
     let root = document.root_element();
@@ -55,7 +55,7 @@ fn of_storage(node: roxmltree::Node<'_, '_>, depth: usize, left: &mut usize) -> 
     Some(if is_list { Value::List(entries.into_iter().map(|(_, value)| value).collect()) } else { Value::Map(entries) })
 }
 
-/// The fields of a document; `None` where it is no XML or describes something else.
+/// The fields of a document; `None` where it is not XML or describes something else.
 pub(super) fn document(text: &str) -> Option<Value> {
     let document = parsed(text).ok()?;
     let root = document.root_element();
@@ -99,7 +99,7 @@ fn of_node(node: roxmltree::Node<'_, '_>, depth: usize, left: &mut usize) -> Opt
     Some(Value::Map(entries.into_iter().map(|(name, values)| (name, one_or_list(values))).collect()))
 }
 
-/// Numbers, whatever stands between them, or words.
+/// Numbers, whatever separates them, or words.
 fn scalar(text: &str, left: &mut usize) -> Option<Value> {
     let text = text.trim();
     let is_between = |c: char| c.is_whitespace() || matches!(c, ';' | '[' | ']' | '(' | ')');
@@ -107,7 +107,8 @@ fn scalar(text: &str, left: &mut usize) -> Option<Value> {
     *left = left.checked_sub(words.len())?;
     let mut numbers = Vec::new();
     for word in words {
-        // One comma within a number is that of the countries that write it so; a list of two numbers is no part of a pose.
+        // One comma within a number is that of the countries that write it so; a list of two numbers is not part of a
+        // pose.
         let with_comma = || (word.matches(',').count() == 1).then(|| number(&word.replace(',', "."))).flatten();
         if let Some(number) = number(word).or_else(with_comma) {
             numbers.push(number);

@@ -1,9 +1,9 @@
-//! How far the clocks of a moving robot and of its camera are apart, from what both saw of the motion.
+//! Offset between the clocks of a moving robot and of its camera, from the motion that both recorded.
 //!
 //! Over any interval of time the mount and the target turn by the same angle, whatever the links between them are. So the
-//! offset is looked for where the angles of the robot's stream and those of the camera's agree, and every place where they
-//! do is then refined with both links: `e_i(δ) = log(C_i⁻¹ X⁻¹ M(t_i + δ)⁻¹ Y)` as in [`pose_graph`], with `δ` one unknown
-//! more, `M` interpolated between the robot's poses.
+//! offset is searched for where the angles of the robot's stream and those of the camera's agree, and every place where
+//! they do is then refined with both links: `e_i(δ) = log(C_i⁻¹ X⁻¹ M(t_i + δ)⁻¹ Y)` as in [`pose_graph`], with `δ` one
+//! unknown more, `M` interpolated between the robot's poses.
 //!
 //! # Reference
 //! Furrer, Fehr, Novkovic, Sommer, Gilitschenski & Siegwart 2018, "Evaluation of combined time-offset estimation and hand-eye
@@ -21,49 +21,49 @@ use handeye_geometry::statistics::median;
 use handeye_wording::Text;
 use handeye_wording::text;
 
-/// Stamps of one clock \[s\], and poses at them.
+/// Timestamps of one clock \[s\], and poses at them.
 pub type Stream<Dst, Src> = [(f64, Pose<Dst, Src>)];
 
 /// The offset of two clocks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClockOffset {
-    /// What is added to a stamp of the camera to have it by the robot's clock \[s\].
+    /// What is added to a timestamp of the camera to convert it to the robot's clock \[s\].
     pub offset_s: f64,
     /// Its standard deviation \[s\], for errors of the poses that are independent.
     pub sigma_s: f64,
 }
 
-/// Why no offset can be told.
+/// Why the offset cannot be determined.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum ClockOffsetError {
-    /// Too short.
+    /// A stream that is too short.
     #[error("{got} poses of the {whose} are too few to tell the offset of its clock, at least {need} are needed", whose = named(whose))]
     TooFew {
-        /// Whose poses: of the robot, or of the camera.
+        /// Whose poses: those of the robot, or of the camera.
         whose: &'static str,
-        /// How many there are.
+        /// Number of poses.
         got: usize,
-        /// How many are needed.
+        /// Number needed.
         need: usize,
     },
-    /// Stamps that stand still, go back or are none.
+    /// Timestamps that repeat, decrease or are not finite.
     #[error(
         "stamps of the {whose} do not rise at entry {entry}, counted from 0: sort them, and leave doubled ones out",
         whose = named(whose)
     )]
     NotRising {
-        /// Whose poses: of the robot, or of the camera.
+        /// Whose poses: those of the robot, or of the camera.
         whose: &'static str,
-        /// Where.
+        /// Index of the entry, counted from 0.
         entry: usize,
     },
-    /// The streams are of different times, or the offset is larger than what was looked for.
+    /// The streams were recorded at different times, or the offset is larger than the range searched.
     #[error(
         "the stamps of robot and camera have too little time in common within {within_s} s of each other: state the offset roughly"
     )]
     Apart {
-        /// What was looked for \[s\].
+        /// The largest offset searched for \[s\].
         within_s: f64,
     },
     /// A motion that repeats itself fits at several offsets.
@@ -71,12 +71,12 @@ pub enum ClockOffsetError {
         "offsets of {first_s:.3} s and {second_s:.3} s fit about as well: record a motion that does not repeat itself"
     )]
     Ambiguous {
-        /// The best \[s\].
+        /// The best offset \[s\].
         first_s: f64,
         /// Another one \[s\].
         second_s: f64,
     },
-    /// A motion without changes tells no time.
+    /// A motion without changes does not determine the offset.
     #[error(
         "the motion tells the offset of the clocks to no better than {sigma_s:.3} s: record one that turns and changes its speed"
     )]
@@ -102,33 +102,33 @@ fn named(whose: &str) -> Text {
 const NEED: usize = 20;
 /// Length of the intervals over which angles are compared \[s\]: arms change their motion within less.
 const WINDOW_S: f64 = 0.3;
-/// Intervals and pairs that are looked at: a bound on the time it takes, which decides nothing. Four times as many would
-/// halve a standard deviation that is a small part of the time between two images by then.
+/// Most intervals and pairs that are used: a bound on the time it takes, without influence on decisions. Four times as
+/// many would halve a standard deviation that is a small part of the time between two images by then.
 const MOST: usize = 400;
 /// Part of the intervals that has to agree: a tenth of the poses may be wrong, each the end of two intervals.
 const AGREEING: f64 = 0.8;
-/// Offsets that are refined: those at which the mean square of the disagreement is no more than so many times that at the best
-/// one, and no more than so many. They are chosen generously, since refining one costs some time and nothing else: which of
-/// them is right is decided by their likelihoods, see [`BEATS`].
+/// Offsets that are refined: those at which the mean square of the disagreement is no more than this many times that at the
+/// best one, and at most `CANDIDATES` of them. The limits are generous, since refining one only costs some time: which of them
+/// is right is decided by their likelihoods, see [`BEATS`].
 const NEARLY: f64 = 4.0;
 const CANDIDATES: usize = 16;
-/// A pair is left out beyond so many times the median misfit. Of six Gaussian numbers that is eleven standard deviations, where
-/// no right pair is; a pair of two different moments is off by as far as the robot goes in between.
+/// A pair is left out beyond this many times the median misfit. For six Gaussian numbers that is eleven standard deviations,
+/// where no right pair is; a pair of two different moments is off by the robot's motion in between.
 const OUTLIER: f64 = 5.0;
 /// Gauss–Newton steps.
 const MAX_STEPS: usize = 20;
-/// An offset beats another one when the likelihood of a pair is larger on the average by so many of its standard errors: by
+/// An offset beats another one when the likelihood of a pair is larger on average by this many of its standard errors: by
 /// chance once in a thousand (Vuong 1989, "Likelihood ratio tests for model selection and non-nested hypotheses").
 const BEATS: f64 = 3.09;
-/// A pair counts no more than one that is off by so many standard deviations: one wrong pair among a hundred that are right must
-/// not outvote them, and right ones, of which one in 4·10⁷ is as far, count in full.
+/// A pair counts no more than one that is off by this many standard deviations: one wrong pair among a hundred that are right
+/// must not outvote them, and right ones, of which one in 4·10⁷ is as far off, count in full.
 const MOST_OFF: f64 = 7.0;
 
 /// Estimates the offset between the clocks of `robot` (anchor_from_mount) and `camera`, when it is within `within_s` seconds of
 /// zero.
 ///
 /// # Needs
-/// Both while the robot moves: turning about several axes, with changes of speed. A robot that stands still at every view needs
+/// Both while the robot moves: turning about several axes, with changes of speed. A robot that is at rest at every view needs
 /// no common clock.
 ///
 /// # Errors
@@ -174,7 +174,7 @@ pub fn clock_offset(
         return Err(failure.map_or(ClockOffsetError::Apart { within_s }, ClockOffsetError::HandEye));
     };
     let ClockOffset { offset_s, sigma_s } = best.offset;
-    // In less time than it is uncertain by the motion has not changed.
+    // Within the uncertainty of the offset the motion has not changed.
     if 2.0 * sigma_s >= WINDOW_S {
         return Err(ClockOffsetError::Uncertain { sigma_s });
     }
@@ -190,7 +190,8 @@ pub fn clock_offset(
     Ok(best.offset)
 }
 
-/// The pose of a stream at a time: turned evenly and moved straight between the two about it; `None` outside.
+/// The pose of a stream at a time, interpolated between the two around it with a uniform rotation and a straight
+/// motion; `None` outside.
 pub fn pose_at<Dst: Copy, Src: Copy>(stream: &Stream<Dst, Src>, time_s: f64) -> Option<Pose<Dst, Src>> {
     let next = stream.partition_point(|(stamp_s, _)| *stamp_s < time_s);
     let (after_s, after) = stream.get(next)?;
@@ -252,7 +253,7 @@ fn candidates(
         let agreeing = (AGREEING * squares.len() as f64).ceil() as usize;
         Some(squares[..agreeing].iter().sum::<f64>() / agreeing as f64)
     };
-    // Beyond these the streams have nothing in common.
+    // Beyond these the streams do not overlap.
     let ends = |at: usize, of: usize| robot[at].0 - camera[of].0;
     let low_s = ends(0, camera.len() - 1).max(-within_s);
     let high_s = ends(robot.len() - 1, 0).min(within_s);
@@ -314,7 +315,7 @@ fn refine(
         }
         solution = pose_graph::refine(&now, &of_solution(&solution))?;
         let Some((by, sigma)) = solution.shift(&now, &before, &after) else { break };
-        // In units of what lies between before and after.
+        // In units of the time between before and after.
         let by_s = (by * step_s)
             .clamp(-step_s, step_s)
             .clamp(start_s - 1.5 * step_s - offset.offset_s, start_s + 1.5 * step_s - offset.offset_s);

@@ -8,7 +8,7 @@ use handeye_simulate::links::noise_twist;
 
 const OFFSET_S: f64 = 0.0437;
 
-/// An arm that sways, its motions as `waves` says: amplitude, frequency \[Hz\] and phase of every number of its pose.
+/// An arm that sways, its motions given by `waves`: amplitude, frequency \[Hz\] and phase of every number of its pose.
 fn arm(time_s: f64, waves: &[[f64; 3]]) -> Isometry3<f64> {
     let of = |axis: usize| -> f64 {
         let own = waves.iter().enumerate().filter(|(i, _)| i % 6 == axis);
@@ -73,7 +73,7 @@ fn the_offset_is_found_as_well_as_it_is_said_to_be() {
 
 #[test]
 fn a_motion_that_tells_no_time_is_refused() {
-    // Turning evenly about one axis.
+    // Uniform rotation about one axis.
     let even = |t: f64| Isometry3::new(Vector3::new(0.4, 0.0, 0.5), Vector3::z() * 0.4 * t);
     let x: Pose<Mount, Camera> = Pose::from_isometry(se3::exp(&Vector6::new(0.03, -0.05, 0.08, 0.2, -0.3, 1.5)));
     let y: Pose<Anchor, Target> = Pose::from_isometry(se3::exp(&Vector6::new(0.9, 0.1, 0.1, 1.0, 2.0, 0.5)));
@@ -89,7 +89,7 @@ fn a_motion_that_tells_no_time_is_refused() {
         .collect();
     let refused = reported(&(robot, camera), 0.5);
     assert!(refused.is_err(), "{refused:?}");
-    // A robot that stands still.
+    // A robot at rest.
     let (robot, camera) = recorded(&[], 6.0, (1e-3, 2e-3), 6);
     let refused = reported(&(robot, camera), 0.5);
     assert!(refused.is_err(), "{refused:?}");
@@ -97,7 +97,8 @@ fn a_motion_that_tells_no_time_is_refused() {
 
 #[test]
 fn a_motion_that_repeats_itself_is_told_from_one_that_does_not() {
-    // Twice a second on all axes: an offset of half a second more fits as well, and one of a quarter nearly so.
+    // Twice a second on all axes: an offset of half a second more fits as well, and one of a quarter second nearly as
+    // well.
     let twice: Vec<[f64; 3]> = (0..6).map(|k| [0.4, 2.0, f64::from(k)]).collect();
     let both = recorded(&twice, 10.0, (1e-3, 2e-3), 7);
     let refused = reported(&both, 1.0).expect_err("it repeats itself");

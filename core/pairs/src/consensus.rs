@@ -1,9 +1,9 @@
 //! A start that most views agree with, when some of them are wrong.
 //!
-//! A closed form takes every view at its word, and one wrong view spoils it. So besides the closed forms on all views,
-//! small sets of them are solved, and the solution is taken that puts the nearest part of all views nearest (least trimmed
-//! sum of misfits). Targets that look the same after half a turn, or a quarter, may be numbered from another corner in every view; all are
-//! tried, and the views that have to be renumbered are named.
+//! A closed form trusts every view, and one wrong view spoils it. So in addition to the closed forms on all views, small sets of
+//! them are solved, and the solution is taken that puts the nearest part of all views nearest (least trimmed sum of misfits).
+//! Targets that look the same after half a turn, or a quarter, may be numbered from another corner in every view; all are tried,
+//! and the views that have to be renumbered are named.
 //!
 //! # Reference
 //! Fischler & Bolles 1981, "Random sample consensus", CACM 24; Rousseeuw 1984, "Least median of squares regression",
@@ -14,19 +14,20 @@ use super::draw::Draw;
 use super::numbering::{Turns, unlike_rad};
 use super::{PosePair, subset};
 
-/// Sets that are tried: with four in ten views wrong, one in eight sets of four is clean, and fifty leave no doubt.
+/// Sets that are tried: with four in ten views wrong, one in eight sets of four is clean, and fifty sets are enough.
 const TRIALS: usize = 60;
-/// Views in a set: two motions are the least, a third one steadies them.
+/// Views in a set: two motions are the minimum, a third one makes them more robust.
 const SET: usize = 4;
 /// Part of the views that a start has to agree with.
 const AGREEING: f64 = 0.7;
-/// Views below which nothing can be outvoted.
+/// Views below which no view can be outvoted.
 const NEED: usize = 5;
 
-/// Numberings of a set that are solved: of the four of square targets those under which robot and target turn most alike.
+/// Numberings of a set that are solved: of the four of square targets those under which the turns of robot and target
+/// agree best.
 const NUMBERINGS: usize = 1 << (SET - 1);
 
-/// A start and the views whose target has to be numbered otherwise for it.
+/// A start and the views whose target has to be renumbered for it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Consensus {
     /// The start.
@@ -37,9 +38,9 @@ pub struct Consensus {
 
 /// The candidate that most views agree with.
 ///
-/// `candidates` are the closed forms on all views. `misfit(solution, view, quarters)` is how badly a view fits that is numbered by so
-/// many quarter turns otherwise, in pixels or any unit, not finite where it has no image; `turns` are the ways to number the target.
-/// `None` when no candidate has a finite misfit.
+/// `candidates` are the closed forms on all views. `misfit(solution, view, quarters)` is the misfit of a view renumbered by this
+/// many quarter turns, in pixels or any unit, not finite where it has no image; `turns` are the ways to number the target. `None`
+/// when no candidate has a finite misfit.
 pub fn consensus(
     pairs: &[PosePair],
     candidates: &[ClosedFormSolution],
@@ -47,7 +48,7 @@ pub fn consensus(
     misfit: impl Fn(&ClosedFormSolution, usize, usize) -> f64,
 ) -> Option<Consensus> {
     let judged = subset::spread(pairs.len(), subset::MOST_VIEWS);
-    // The first of equals, which is as it was detected.
+    // Of equal ones the first, which is as detected.
     let best_way = |solution: &ClosedFormSolution, view: usize| {
         let ways = turns.quarters().map(|quarters| (misfit(solution, view, quarters), quarters));
         ways.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, 0))
@@ -67,7 +68,7 @@ pub fn consensus(
         .min_by(|a, b| a.0.total_cmp(&b.0))?;
     let solution = *best.1;
     let quarters: Vec<usize> = (0..pairs.len()).map(|view| best_way(&solution, view).1).collect();
-    // Numbering all views otherwise is the same target in another frame; fewer changes are easier to follow.
+    // Renumbering all views is the same target in another frame; the solution with fewer changes is easier to follow.
     let count = |way: usize| quarters.iter().filter(|it| **it == way).count();
     let mut common = 0;
     for way in turns.quarters() {
@@ -80,7 +81,7 @@ pub fn consensus(
     Some(Consensus { solution: ClosedFormSolution { anchor_from_target, ..solution }, turned })
 }
 
-/// How many of so many views a start has to agree with.
+/// How many of `count` views a start has to agree with.
 fn trimmed(count: usize) -> usize {
     ((AGREEING * count as f64).ceil() as usize).clamp(1, count)
 }
@@ -162,7 +163,7 @@ mod tests {
         assert!(error(&all) > 1e-3, "the views were wrong: {}", error(&all));
     }
 
-    /// A board of which the numbering is open by half a turn, and one by a quarter.
+    /// A board whose numbering is ambiguous by half a turn, and one by a quarter.
     #[test]
     fn views_numbered_from_another_corner_are_named() {
         use handeye_geometry::targets::{Grid, TargetSpec};

@@ -5,7 +5,7 @@
 pub struct Draw(u64);
 
 impl Draw {
-    /// Begins at a number; any does.
+    /// Starts from a seed; any number will do.
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
@@ -18,23 +18,23 @@ impl Draw {
         z ^ (z >> 31)
     }
 
-    /// Evenly from 0 to 1, without either.
+    /// Uniform between 0 and 1, both excluded.
     pub fn even(&mut self) -> f64 {
         ((self.next() >> 11) as f64 + 0.5) / (1u64 << 53) as f64
     }
 
-    /// Of a normal distribution of mean 0 and variance 1 (Box & Muller 1958).
+    /// From a normal distribution with mean 0 and variance 1 (Box & Muller 1958).
     pub fn normal(&mut self) -> f64 {
         let (length, angle) = (self.even(), self.even());
         (-2.0 * length.ln()).sqrt() * (std::f64::consts::TAU * angle).cos()
     }
 
-    /// A number below `bound`; the bias of the remainder is beneath one in 2⁵⁰ for any number of views.
+    /// A number below `bound`; the bias of the remainder is below one in 2⁵⁰ for any number of views.
     pub fn below(&mut self, bound: usize) -> usize {
         (self.next() % bound.max(1) as u64) as usize
     }
 
-    /// `most` different numbers below `count`, or all there are.
+    /// `most` different numbers below `count`, or all of them.
     pub fn distinct(&mut self, count: usize, most: usize) -> Vec<usize> {
         let mut drawn: Vec<usize> = Vec::with_capacity(most);
         while drawn.len() < most.min(count) {

@@ -1,6 +1,7 @@
 //! Hand-eye calibration from pairs of poses: of the robot, and of the target in the camera.
 //!
-//! The problem in its two set-ups, seven closed forms, and what estimates both links with noise levels and without outliers:
+//! The problem in its two set-ups, seven closed forms, and the estimation of both links with noise levels and without
+//! outliers:
 //!
 //! ```
 //! use handeye_geometry::frames::{Anchor, Camera, Mount, Pose, Target};
@@ -37,16 +38,16 @@
 //! | [`closed_form`] | Tsai & Lenz, Park & Martin, Horaud & Dornaika, Andreff, Daniilidis, Shah, Li |
 //! | [`consensus`] | a start that most views agree with |
 //! | [`pose_graph`] | both links from all pairs, with noise levels |
-//! | [`screening`] | views that do not belong to the others |
+//! | [`screening`] | views that do not agree with the others |
 //! | [`scale`] | poses of a target of unknown size |
 //! | [`one_axis`] | what turns about one axis determine |
 //! | [`motion`] | whether the robot turned enough, and about what |
-//! | [`numbering`] | targets that look alike from several sides |
-//! | [`clock_offset`] | how far the clocks of robot and camera are apart |
+//! | [`numbering`] | targets that look the same after a turn |
+//! | [`clock_offset`] | offset between the clocks of robot and camera |
 //! | [`subset`], [`draw`] | views for work that grows with their square, random numbers that are the same every time |
 //!
 //! # The problem
-//! Both set-ups are one problem once the two rigid links are named by what they are: the *mount* carries the camera,
+//! Both set-ups are one problem once the two rigid links are named by their function: the *mount* carries the camera,
 //! the *anchor* carries the target.
 //!
 //! | set-up | mount | anchor | `anchor_from_mount` of a view |
@@ -88,7 +89,7 @@ pub enum HandEye {
         /// The target in the base.
         base_from_target: Pose<Base, Target>,
     },
-    /// Camera beside the robot.
+    /// Camera next to the robot.
     EyeToHand {
         /// The camera in the base.
         base_from_camera: Pose<Base, Camera>,
@@ -98,7 +99,7 @@ pub enum HandEye {
 }
 
 impl HandEye {
-    /// Names the links of the common problem by the set-up they belong to.
+    /// The links of the common problem in the frames of a set-up.
     pub fn new(mode: Mode, mount_from_camera: Pose<Mount, Camera>, anchor_from_target: Pose<Anchor, Target>) -> Self {
         match mode {
             Mode::EyeInHand => Self::EyeInHand {
@@ -112,7 +113,7 @@ impl HandEye {
         }
     }
 
-    /// Which set-up.
+    /// The set-up.
     pub fn mode(&self) -> Mode {
         match self {
             Self::EyeInHand { .. } => Mode::EyeInHand,
@@ -136,7 +137,7 @@ impl HandEye {
         }
     }
 
-    /// Where the target is in a view from a tip pose.
+    /// Pose of the target in the camera for a tip pose.
     pub fn camera_from_target(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Camera, Target> {
         match *self {
             Self::EyeInHand { tip_from_camera, base_from_target } => {
@@ -148,7 +149,7 @@ impl HandEye {
         }
     }
 
-    /// From where the robot sees the target so.
+    /// The tip pose at which the target is seen like this.
     pub fn base_from_tip(&self, camera_from_target: &Pose<Camera, Target>) -> Pose<Base, Tip> {
         match *self {
             Self::EyeInHand { tip_from_camera, base_from_target } => {
@@ -161,7 +162,7 @@ impl HandEye {
     }
 }
 
-/// One view as the closed-form solvers see it: the robot's pose and the target's pose in the camera.
+/// One view as input to the closed-form solvers: the robot's pose and the target's pose in the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PosePair {
     /// Robot pose, see the table of [this crate](self).
@@ -182,7 +183,7 @@ pub enum HandEyeError {
         /// Views needed.
         need: usize,
     },
-    /// The robot never turned, so the rotation of the camera on it cannot be seen.
+    /// The robot never turned, so the rotation of the camera on it cannot be determined.
     #[error(
         "the robot turned by no more than {largest_deg:.3}° between any two views: turn the tip by 30° or more about \
          two different axes"
@@ -191,7 +192,7 @@ pub enum HandEyeError {
         /// Largest rotation between two views, degrees.
         largest_deg: f64,
     },
-    /// The robot turned about one direction only, so the translation along it cannot be seen.
+    /// The robot turned about one direction only, so the translation along it cannot be determined.
     #[error(
         "all rotations are about the same axis [{x:.3} {y:.3} {z:.3}] of the {frame} (spread {spread_deg:.3}°): add views \
          turned about another axis",
@@ -203,7 +204,7 @@ pub enum HandEyeError {
     ParallelAxes {
         /// The common axis.
         axis: [f64; 3],
-        /// Frame it is given in.
+        /// Frame in which it is given.
         frame: &'static str,
         /// How far the axes spread, degrees.
         spread_deg: f64,
@@ -222,7 +223,7 @@ pub enum HandEyeError {
     NoSolution {
         /// Name of the closed form, or of the pose graph.
         method: &'static str,
-        /// With how many views.
+        /// Number of views.
         views: usize,
         /// What failed.
         reason: &'static str,
@@ -237,7 +238,7 @@ fn named(frame: &str) -> Text {
     }
 }
 
-/// What was found; `None` where the data determine nothing.
+/// The solution; `None` where the data do not determine one.
 ///
 /// # Errors
 /// [`HandEyeError::Cancelled`].

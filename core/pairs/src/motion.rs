@@ -2,9 +2,9 @@
 //!
 //! Between the views `i` and `j` the camera's carrier makes the motion
 //! `mount_j_from_mount_i = anchor_from_mount_j⁻¹ * anchor_from_mount_i`. Only its rotation axis and angle decide what
-//! can be seen: motions without rotation leave the rotation of the camera unknown, and motions about one axis only
-//! leave its translation along that axis unknown. Both hold for every method, so they are found here, from the robot
-//! poses alone, before anything is solved.
+//! can be determined: motions without rotation leave the rotation of the camera unknown, and motions about one axis
+//! only leave its translation along that axis unknown. Both hold for every method, so they are found here, from the
+//! robot poses alone, before anything is solved.
 
 use nalgebra::{Matrix3, SymmetricEigen, UnitQuaternion, Vector3};
 
@@ -14,7 +14,7 @@ use handeye_geometry::frames::{Anchor, Frame as _, Mount, Pose};
 /// Two motions about different axes are the least that determines a hand-eye transform, and they take three views.
 pub const MIN_VIEWS: usize = 3;
 
-/// A turn below this, in radians, counts as none. Real pose pairs scatter by 0.04° to 0.26° per axis (robot and camera
+/// A turn below this, in radians, counts as zero. Real pose pairs scatter by 0.04° to 0.26° per axis (robot and camera
 /// together), so the axis of a turn under 1° is mostly noise.
 pub const NO_ROTATION_RAD: f64 = 1f64.to_radians();
 
@@ -40,7 +40,7 @@ pub struct MotionSummary {
     /// A turn by θ counts with its chord `2 sin(θ/2)`, which is θ when small and needs no sign at a half turn.
     pub principal_rotations_rad: [f64; 3],
     /// How far the rotation axes spread around the first principal axis, radians: 0 when all are parallel, π/4 when
-    /// two directions are used alike.
+    /// two directions are used equally.
     pub axis_spread_rad: f64,
 }
 
@@ -49,7 +49,7 @@ pub struct MotionSummary {
 /// # Frames and units
 /// Robot poses as in the table of [the parent module](super); axes in the mount frame; metres and radians.
 /// Neither a change of the anchor frame nor a repeated pose changes the verdict. Of more than
-/// [`subset::MOST_VIEWS`] views that many are looked at, because the pairs grow with the square.
+/// [`subset::MOST_VIEWS`] views only that many are used, because the pairs grow with the square.
 /// # Errors
 /// In this order: [`HandEyeError::TooFewViews`] below [`MIN_VIEWS`], [`HandEyeError::NotFinite`] with the first such
 /// view, [`HandEyeError::NoRotation`] when no two views differ by [`NO_ROTATION_RAD`],

@@ -1,4 +1,5 @@
-//! Which point of a target is counted first, where it looks the same after a turn: every view may have been counted otherwise.
+//! Which point of a target is numbered first, where it looks the same after a turn: every view may have been numbered
+//! differently.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
@@ -8,7 +9,7 @@ use super::subset;
 use handeye_geometry::frames::Pose;
 use handeye_geometry::targets::TargetSpec;
 
-/// The ways to count a target that looks the same after a turn: those that are not as it was detected.
+/// The ways to number a target that looks the same after a turn, other than that of the detection.
 #[derive(Debug, Clone, Default)]
 pub struct Turns {
     /// The quarter turns of each about the middle of the target, and the motion of its frame.
@@ -16,7 +17,7 @@ pub struct Turns {
 }
 
 impl Turns {
-    /// Of a target.
+    /// The ways to number a target.
     pub fn of(target: &TargetSpec) -> Self {
         let centre = target.centre().coords;
         let about = |quarters: usize| {
@@ -37,12 +38,12 @@ impl Turns {
         std::iter::once(0).chain(self.others.iter().map(|(quarters, _)| *quarters))
     }
 
-    /// The motion of the target's frame by so many quarter turns; `None` where that is as it was detected.
+    /// The motion of the target's frame by this many quarter turns; `None` where that is as detected.
     pub fn motion(&self, quarters: usize) -> Option<&Isometry3<f64>> {
         self.others.iter().find(|(known, _)| *known == quarters % 4).map(|(_, motion)| motion)
     }
 
-    /// A pose in which something sees the target, counted otherwise.
+    /// A pose of the target in another frame, with the target renumbered.
     pub fn turned<From: handeye_geometry::frames::Frame, To: handeye_geometry::frames::Frame>(
         &self,
         pose: &Pose<From, To>,
@@ -51,41 +52,42 @@ impl Turns {
         self.motion(quarters).map_or(*pose, |motion| Pose::from_isometry(pose.isometry() * motion))
     }
 
-    /// Poses of the target under every other way to count it.
+    /// Poses of the target under every other numbering.
     pub fn others(&self, seen: &Isometry3<f64>) -> impl Iterator<Item = Isometry3<f64>> {
         self.others.iter().map(move |(_, motion)| seen * motion)
     }
 
-    /// The pair with its target counted otherwise.
+    /// The pair with its target renumbered.
     pub fn pair(&self, pair: &PosePair, quarters: usize) -> PosePair {
         PosePair { camera_from_target: self.turned(&pair.camera_from_target, quarters), ..*pair }
     }
 }
 
-/// Angles of robot and target that differ by more than this, radians, say no more than those that differ by it: one view may be wrong.
+/// Angles of robot and target that differ by more than this, radians, count no more than those that differ by it: one view may be
+/// wrong.
 const CAP_RAD: f64 = 0.2;
-/// Views of which each is tried as the one that the others agree with, those that every view is compared with, and rounds in which all
-/// are counted again.
+/// Views of which each is tried as the one that the others agree with, those that every view is compared with, and rounds in which
+/// all are renumbered.
 const MOST_TRIED: usize = 6;
 const MOST_COMPARED: usize = 30;
 const ROUNDS: usize = 2;
 
-/// How unlike robot and target turn between two views: from one to the other both turn by the same angle (Shiu & Ahmad 1989, the
-/// rotational part of AX = XB), radians.
+/// Difference between the turns of robot and target between two views: from one to the other both turn by the same angle (Shiu &
+/// Ahmad 1989, the rotational part of AX = XB), radians.
 pub fn unlike_rad(a: &PosePair, b: &PosePair) -> f64 {
     let robot = rotation_angle(&(a.anchor_from_mount.rotation().inverse() * b.anchor_from_mount.rotation()));
     let target = rotation_angle(&(a.camera_from_target.rotation() * b.camera_from_target.rotation().inverse()));
     (robot - target).abs().min(CAP_RAD)
 }
 
-/// The pairs with their targets counted so that robot and target turn alike.
+/// The pairs with their targets numbered so that the turns of robot and target agree.
 pub fn alike(pairs: &[PosePair], turns: &Turns) -> Vec<PosePair> {
     if turns.is_empty() || pairs.len() < 2 {
         return pairs.to_vec();
     }
     let ways: Vec<Vec<PosePair>> =
         pairs.iter().map(|pair| turns.quarters().map(|quarters| turns.pair(pair, quarters)).collect()).collect();
-    // The first of equals, which is the one that was detected.
+    // Of equal ones the first, which is the one detected.
     let best = |of: &[PosePair], others: &dyn Fn(&PosePair) -> f64| {
         let unlike = of.iter().map(others).enumerate();
         unlike.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(way, _)| way)

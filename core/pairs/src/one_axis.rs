@@ -1,19 +1,19 @@
-//! What a robot that turned about one axis only says of its camera: five of the six numbers.
+//! What a robot that turned about one axis only determines of its camera: five of the six numbers.
 //!
 //! # What it estimates
 //! Let all turns of the mount be about the axis `a` (in the mount frame; `a'` in the anchor frame, the same for every view).
 //! Moving the camera by `s a` on its mount moves the chain `anchor_from_mount_i * mount_from_camera` by
-//! `R_i s a = s a'` in every view alike, which a target moved by `s a'` on its anchor takes up. So the component of the
+//! `R_i s a = s a'` in every view equally, which a target moved by `s a'` on its anchor compensates. So the component of the
 //! camera's place along `a` is open, and trades with that of the target along `a'`; orientation and the two components across are
-//! determined where the robot moved across the axis as well. For an eye in hand `a` is an axis of the tip and `a'` of the
-//! base, for an eye to hand the other way round.
+//! determined where the robot moved across the axis as well. For an eye in hand `a` is an axis of the tip and `a'` of the base,
+//! for an eye to hand the other way round.
 //!
 //! A robot that turned about one line, as one joint does, leaves the camera's turn about this line open too; then there are
 //! four numbers, and nothing is stated.
 //!
 //! # How
 //! A linear start, then the pose graph with a prior on the open component ([`pose_graph::refine_one_axis`]), so that turns
-//! that wobble within the limit of [`super::motion`] count with what they are worth.
+//! that wobble within the limit of [`super::motion`] count with the information they have.
 //!
 //! # Reference
 //! Tsai & Lenz 1989, section II; Andreff et al. 2001, "Robot hand-eye calibration using structure from motion", section 3.4
@@ -28,20 +28,20 @@ use handeye_geometry::frames::{Camera, Mount, Pose};
 use handeye_wording::Text;
 use handeye_wording::text;
 
-/// Turns beyond this \[rad\] have axes whose sign noise decides; they are not asked for the axis in the camera.
+/// Turns beyond this \[rad\] have axes whose sign is decided by noise; they are not used for the axis in the camera.
 const HALF_TURN_RAD: f64 = 150f64.to_radians();
 /// Standard deviation of the turn about the axis \[rad\] from which it counts as open: an orientation that may be off by ten
-/// degrees is none.
+/// degrees is not useful.
 const OPEN_TURN_RAD: f64 = 5f64.to_radians();
 
 /// Motions that stay so near \[m\] to turns about one line leave the turn about it open: half a millimetre of pose error over
-/// less is the six degrees of [`OPEN_TURN_RAD`]. Exact poses would otherwise be believed to rounding.
+/// less is the six degrees of [`OPEN_TURN_RAD`]. Exact poses would otherwise be trusted down to rounding.
 const ONE_LINE_M: f64 = 5e-3;
 
-/// The part of a hand-eye transform that turns about one axis determine. It is no transform: one number is open.
+/// The part of a hand-eye transform that turns about one axis determine. It is not a transform: one number is open.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PartialHandEye {
-    /// Where the camera sits.
+    /// Where the camera is mounted.
     pub mode: Mode,
     /// Number of views that it rests on.
     pub views: usize,
@@ -96,7 +96,7 @@ impl PartialHandEye {
 /// The five numbers from pose pairs whose robot turned about `axis` of the mount only, as [`super::motion::analyse`] finds it.
 ///
 /// # Needs
-/// Three pairs, and motions across the axis that are no turn about one line.
+/// Three pairs, and motions across the axis that are not a turn about one line.
 ///
 /// # Degenerate cases
 /// `None` where the turn of the camera about the axis is open too, and where there is no solution.
@@ -114,7 +114,7 @@ pub fn solve(mode: Mode, pairs: &[PosePair], axis: Vector3<f64>) -> Option<Parti
     let place_in_mount = rotation.to_rotation_matrix() * place * rotation.inverse().to_rotation_matrix();
     let place_covariance = Matrix2::from_fn(|i, j| across[i].dot(&(place_in_mount * across[j].into_inner())));
     let translation = found.mount_from_camera.translation();
-    // Not a number is not below either.
+    // NaN is not below either.
     (about < OPEN_TURN_RAD).then(|| PartialHandEye {
         mode,
         views: pairs.len(),

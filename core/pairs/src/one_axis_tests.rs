@@ -56,7 +56,7 @@ proptest! {
         let session = session(seed, views, 0.2, false);
         let found = solve(Mode::EyeInHand, &session.pairs, session.axis.into_inner()).expect("five numbers");
         let (place, turn) = errors(&found, &session.mount_from_camera);
-        // Rounding of metres, raised by as much as turns of a radian and moves of 0.2 m may be ill placed.
+        // Rounding of metres, raised by the condition of turns of a radian and moves of 0.2 m.
         prop_assert!(place.norm() < 1e-7 && turn.norm() < 1e-7, "{place} {turn}");
         let seen = session.mount_from_camera.rotation().inverse() * session.axis;
         prop_assert!((seen.into_inner() - found.open_axis_in_camera.into_inner()).norm() < 1e-7);
@@ -74,7 +74,7 @@ fn the_five_numbers_are_as_good_as_they_say() {
         squares += place.dot(&(found.place_covariance.try_inverse().expect("definite") * place)) / 2.0;
         squares += turn.iter().zip(found.rotation_sigma_rad).map(|(e, s)| (e / s).powi(2)).sum::<f64>() / 3.0;
     }
-    // Each term has mean 1 and at the most the variance of a chi-square with one degree of freedom, 2; estimated levels
+    // Each term has mean 1 and at most the variance of a chi-square with one degree of freedom, 2; estimated levels
     // with 39 degrees of freedom raise the mean to 39 / 37. The mean of the 400 terms is within four deviations of it.
     let mean = squares / (2.0 * SESSIONS as f64);
     let deviation = (2.0 / SESSIONS as f64).sqrt();

@@ -2,14 +2,15 @@
 //!
 //! Minimises `Σ eᵢᵀ Vᵢ⁻¹ eᵢ` of `eᵢ = log(camera_from_target_i⁻¹ * predicted_i)` over `mount_from_camera` and
 //! `anchor_from_target`. `Vᵢ` has three levels, [`Levels`], by restricted maximum likelihood: positions, rotations of the
-//! target, and rotations of the robot, which move the target by its distance from the mount and are told from the others by
-//! that.
+//! target, and rotations of the robot, which move the target by its distance from the mount and are separated from the
+//! others by that.
 //!
-//! The unit of the target poses may be unknown, as that of a single moving camera is, or of markers of unknown size. Then a
-//! scale of their translations is one more unknown, which the robot's translations tell.
+//! The unit of the target poses may be unknown, as for a single moving camera or markers of unknown size. Then a scale of
+//! their translations is one more unknown, which the robot's translations determine.
 //!
-//! Reference: Andreff, Horaud & Espiau 2001, "Robot hand-eye calibration using structure-from-motion" (scale); Strobl & Hirzinger 2006, "Optimal hand-eye calibration", with the weights re-estimated from residuals; Harville 1977, "Maximum likelihood approaches to
-//! variance component estimation and to related problems", JASA 72 (levels).
+//! Reference: Andreff, Horaud & Espiau 2001, "Robot hand-eye calibration using structure-from-motion" (scale); Strobl & Hirzinger
+//! 2006, "Optimal hand-eye calibration", with the weights re-estimated from residuals; Harville 1977, "Maximum likelihood
+//! approaches to variance component estimation and to related problems", JASA 72 (levels).
 
 use nalgebra::{Cholesky, Matrix3, Matrix6, Point3, SMatrix, SVector, Unit, Vector3, Vector6};
 
@@ -20,9 +21,10 @@ use super::{HandEyeError, PosePair};
 use handeye_geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use handeye_geometry::se3;
 
-/// A length that no robot resolves, metres: the best arms come back to a place within 0.01 to 0.02 mm (ISO 9283).
+/// A length that no robot resolves, metres: the repeatability of the best arms is 0.01 to 0.02 mm (ISO 9283).
 pub const PLACE_M: f64 = 1e-5;
-/// An angle likewise, radians: a thousandth of a degree, which moves a point at half a metre by that length.
+/// An angle that no robot resolves, radians: a thousandth of a degree, which moves a point at half a metre by that
+/// length.
 pub const ANGLE_RAD: f64 = 1e-3 * std::f64::consts::PI / 180.0;
 
 /// The estimate from pose pairs.
@@ -34,7 +36,7 @@ pub struct PoseGraphSolution {
     pub anchor_from_target: Pose<Anchor, Target>,
     /// Covariance of both, right perturbations, metres and radians.
     pub covariance: SMatrix<f64, 12, 12>,
-    /// Disagreement of the two poses of a pair per axis.
+    /// Standard deviations between the two poses of a pair, per axis.
     pub levels: Levels,
     /// The true length of a target pose's translation over the stated one; 1 when it is taken as exact.
     pub scale: f64,
@@ -42,24 +44,24 @@ pub struct PoseGraphSolution {
     pub scale_sigma: Option<f64>,
 }
 
-/// How far the two poses of a pair disagree, per axis.
+/// Standard deviations between the two poses of a pair, per axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Levels {
-    /// In position, without what rotations of the robot move the target by; metres.
+    /// Of position, without the displacement of the target by rotations of the robot; metres.
     pub position_m: f64,
-    /// By rotations about the target's origin, as errors of the target's pose are; radians.
+    /// Of rotations about the target's origin, like errors of the target's pose; radians.
     pub target_rad: f64,
-    /// By rotations about the mount's origin, as errors of the robot's pose are; radians.
+    /// Of rotations about the mount's origin, like errors of the robot's pose; radians.
     pub robot_rad: f64,
 }
 
 impl Levels {
-    /// Disagreement in rotation, radians.
+    /// Standard deviation of the rotation between both, radians.
     pub fn rotation_rad(&self) -> f64 {
         self.target_rad.hypot(self.robot_rad)
     }
 
-    /// None below what a robot resolves, see [`resolution`].
+    /// The levels, none below what a robot resolves, see [`resolution`].
     fn judged_by(self) -> Self {
         Self {
             position_m: self.position_m.max(PLACE_M),
@@ -68,7 +70,7 @@ impl Levels {
         }
     }
 
-    /// What the covariance of a residual has of each level, at a level of 1.
+    /// The part of each level in the covariance of a residual, at a level of 1.
     fn parts(target_from_mount: &Vector3<f64>) -> [Matrix6<f64>; 3] {
         let (position, rotation) =
             (Vector6::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0), Vector6::new(0.0, 0.0, 0.0, 1.0, 1.0, 1.0));
@@ -99,8 +101,8 @@ impl PoseGraphSolution {
         predict(pair, &self.mount_from_camera, &self.anchor_from_target)
     }
 
-    /// How far every one of `pairs` is from what a solution from those `kept`, ascending, expects; `middle` is a point of the
-    /// target, metres.
+    /// Distance of every one of `pairs` from the expectation of a solution from those `kept`, ascending; `middle` is a point
+    /// of the target, metres.
     pub fn judge(&self, pairs: &[PosePair], kept: &[usize], middle: &Point3<f64>) -> Vec<Judged> {
         let unknowns = 12 + usize::from(self.scale_sigma.is_some());
         let freedom = 0.5 * (6.0 * kept.len() as f64 - unknowns as f64);
@@ -111,7 +113,7 @@ impl PoseGraphSolution {
             let jacobian = jacobian(&seen, &predicted).fixed_columns::<12>(0).into_owned();
             let shared = jacobian * self.covariance * jacobian.transpose();
             let expected = if kept.binary_search(&index).is_ok() { own - shared } else { own + shared };
-            // A pair that the others do not determine has nothing to disagree with.
+            // Where the others do not determine a pair it cannot disagree with them.
             let expected = Cholesky::new(expected).or_else(|| Cholesky::new(own));
             let error = residual(&seen, &predicted);
             let metres = (seen.isometry() * middle - predicted.isometry() * middle).norm();
@@ -148,7 +150,7 @@ const LEVEL_FLOOR: f64 = 1e-12;
 const LARGEST_STEP: f64 = 2.0;
 /// A step that changes the levels by less than this part of them ends the iteration.
 const SETTLED: f64 = 1e-6;
-/// The least part of the rotation's level that either of its two has: what is below changes nothing, and a level of zero
+/// The least part of the rotation's level that either of its two has: a lower one changes nothing, and a level of zero
 /// would stay there.
 const LEAST_PART: f64 = 1e-2;
 
@@ -166,7 +168,7 @@ pub fn refine(pairs: &[PosePair], start: &ClosedFormSolution) -> Result<PoseGrap
 /// As [`refine`], with the scale of the target poses unknown; `scale` is near it.
 ///
 /// # Errors
-/// As [`refine`]; translations of the robot that are none tell no scale.
+/// As [`refine`]; a robot without translations does not determine the scale.
 pub fn refine_scaled(
     pairs: &[PosePair],
     start: &ClosedFormSolution,
@@ -176,13 +178,14 @@ pub fn refine_scaled(
 }
 
 /// Standard deviation of the open component of a camera's place beforehand, metres: farther than any camera is from the
-/// origin of what carries it.
+/// origin of its carrier.
 const OPEN_M: f64 = 10.0;
-/// Least information on it as a part of the largest: what rounding leaves of exact data.
+/// Least information on it as a part of the largest: the rounding error with exact data.
 const LEAST_INFORMATION: f64 = 1e-9;
 
 /// As [`refine`] where all turns are about `axis` of the mount, so that the camera's place along it is open. It has a prior
-/// of 10 m about the origin of the mount, and the covariance says so; everything else comes with what its lack costs.
+/// of 10 m about the origin of the mount, which is part of the covariance; everything else includes the uncertainty due to
+/// it.
 pub(super) fn refine_one_axis(
     pairs: &[PosePair],
     start: &ClosedFormSolution,
@@ -243,7 +246,7 @@ fn refine_with(
         x = x.perturbed(&step.fixed_rows::<6>(0).into_owned());
         y = y.perturbed(&step.fixed_rows::<6>(6).into_owned());
         scale *= step[SCALE_AT].exp();
-        // Residuals of the start say little of the levels.
+        // Residuals of the start give little information on the levels.
         let next = if step_number == 0 {
             scatter(pairs, &x, &y, scale)
         } else {
@@ -273,8 +276,9 @@ impl PoseGraphSolution {
         pairs.iter().map(|pair| Row::new(pair, x, y, self.scale, &self.levels)).collect()
     }
 
-    /// How far on the way from `before` to `after`, two neighbours of these pairs, all of them would fit best, with both links
-    /// free: 0 is here, 1 as far as `after` is from `before`. With its standard deviation; `None` where nothing tells it.
+    /// The shift along the motion from `before` to `after`, two neighbours of these pairs, at which all of them would fit
+    /// best, with both links free: 0 is no shift, 1 as far as `after` is from `before`. With its standard deviation; `None`
+    /// where the data do not determine it.
     pub fn shift(&self, pairs: &[PosePair], before: &[PosePair], after: &[PosePair]) -> Option<(f64, f64)> {
         let mut normal = SMatrix::<f64, 12, 12>::zeros();
         let (mut cross, mut gradient) = (SVector::<f64, 12>::zeros(), SVector::<f64, 12>::zeros());
@@ -297,7 +301,7 @@ impl PoseGraphSolution {
     }
 
     /// Minus twice the log-likelihood of each pair, without constants; one that is off by more than `most_off` standard deviations
-    /// counts as one that is off by so many.
+    /// counts as one that is off by this many.
     pub fn deviances(&self, pairs: &[PosePair], most_off: f64) -> Vec<f64> {
         let of_row = |row: Row| {
             let squared = row.error.dot(&(row.weight * row.error)).min(most_off.powi(2));
@@ -333,7 +337,7 @@ impl Row {
 
 impl Levels {
     /// A step of Fisher scoring of the restricted likelihood in the logs of the variances (Harville 1977, §5); `inverse` is that of
-    /// the normal matrix. The information is that of each pair by itself.
+    /// the normal matrix. The information is that of each pair alone.
     fn improved(
         &self,
         rows: &[Row],
@@ -345,7 +349,7 @@ impl Levels {
         for row in rows {
             let weighted = row.weight * error(row);
             let seen = row.weight * row.jacobian;
-            // What the unknowns leave of this pair.
+            // The part of this pair that is left after the unknowns.
             let left = row.weight - seen * inverse * seen.transpose();
             let turned = row.parts.map(|part| left * part);
             for k in 0..3 {
@@ -355,7 +359,7 @@ impl Levels {
                 }
             }
         }
-        // A level of nothing has no information either, and falls as far as it may in one step.
+        // A level of zero has no information either, and falls by the largest step allowed.
         let least = 1e-9 * information.trace() + f64::MIN_POSITIVE;
         let step = Cholesky::new(information + Matrix3::identity() * least).map_or_else(Vector3::zeros, |factor| {
             factor.solve(&gradient).map(|k: f64| k.clamp(-LARGEST_STEP, LARGEST_STEP))
@@ -365,7 +369,7 @@ impl Levels {
         Self { position_m: level(0), target_rad: level(1).max(least), robot_rad: level(2).max(least) }
     }
 
-    /// Whether another step would change nothing that matters.
+    /// Whether the change from one to the other is negligible.
     fn is_near(&self, other: &Self) -> bool {
         let near = |a: f64, b: f64| (a / b).ln().abs() < SETTLED;
         near(self.position_m, other.position_m)
@@ -383,7 +387,7 @@ fn predict(pair: &PosePair, x: &Pose<Mount, Camera>, y: &Pose<Anchor, Target>) -
     x.inverse() * pair.anchor_from_mount.inverse() * *y
 }
 
-/// How far a pair, its target pose `scale` times as far away as stated, is from where a solution puts it; a radian counts as a
+/// Distance of a pair, its target pose `scale` times as far away as stated, from its place by a solution; a radian counts as a
 /// metre.
 pub fn misfit(pair: &PosePair, solution: &ClosedFormSolution, scale: f64) -> f64 {
     let predicted = predict(pair, &solution.mount_from_camera, &solution.anchor_from_target);
@@ -394,7 +398,7 @@ fn residual(seen: &Pose<Camera, Target>, predicted: &Pose<Camera, Target>) -> Ve
     se3::log((seen.inverse() * *predicted).isometry())
 }
 
-/// Of the residual by both links, right perturbations, and the logarithm of the scale, at small residuals.
+/// Jacobian of the residual by both links, right perturbations, and the logarithm of the scale, at small residuals.
 fn jacobian(seen: &Pose<Camera, Target>, predicted: &Pose<Camera, Target>) -> SMatrix<f64, 6, UNKNOWNS> {
     let mut jacobian = SMatrix::<f64, 6, UNKNOWNS>::zeros();
     jacobian.fixed_view_mut::<6, 6>(0, 0).copy_from(&-se3::adjoint(&predicted.isometry().inverse()));
@@ -404,7 +408,8 @@ fn jacobian(seen: &Pose<Camera, Target>, predicted: &Pose<Camera, Target>) -> SM
     jacobian
 }
 
-/// Levels from the residuals, with the unknowns' share of the degrees of freedom taken off evenly: where the iteration begins.
+/// Levels from the residuals, with the unknowns' share of the degrees of freedom subtracted evenly: the start of the
+/// iteration.
 fn scatter(pairs: &[PosePair], x: &Pose<Mount, Camera>, y: &Pose<Anchor, Target>, scale: f64) -> Levels {
     let mut squares = (0.0, 0.0);
     for pair in pairs {

@@ -1,11 +1,11 @@
 //! A start where the unit of the target poses is unknown.
 //!
-//! The rotations do not know of it, so those of both links come from a closed form. The rest is linear: with the rotations
-//! `R_i` of `anchor_from_mount`, `R_x` of `mount_from_camera` and the translations `t_i` and `c_i` of both poses of a view,
-//! `R_i t_x + s R_i R_x c_i − t_y = −t_i` in the two translations and the scale `s`.
+//! The rotations do not depend on it, so those of both links come from a closed form. The rest is linear: with the
+//! rotations `R_i` of `anchor_from_mount`, `R_x` of `mount_from_camera` and the translations `t_i` and `c_i` of both poses
+//! of a view, `R_i t_x + s R_i R_x c_i − t_y = −t_i` in the two translations and the scale `s`.
 //!
-//! Small sets of views are solved so and the answer is taken that most views agree with, because a wrong view may have any
-//! scale.
+//! Small sets of views are solved this way and the answer is taken that most views agree with, because a wrong view may
+//! have any scale.
 //!
 //! # Reference
 //! Andreff, Horaud & Espiau 2001, "Robot hand-eye calibration using structure-from-motion", IJRR 20; Fischler & Bolles 1981,
@@ -27,7 +27,8 @@ const AGREEING: f64 = 0.7;
 /// Translation and two rotations.
 const UNKNOWNS: usize = 7;
 
-/// Both links and the scale that most views agree with; `None` where no set of views tells them, or the scale is none.
+/// Both links and the scale that most views agree with; `None` where no set of views determines them, or the scale is
+/// not positive and finite.
 pub fn start(pairs: &[PosePair]) -> Option<(ClosedFormSolution, f64)> {
     let chosen: Vec<PosePair> = subset::spread(pairs.len(), subset::MOST_VIEWS).into_iter().map(|i| pairs[i]).collect();
     let mut draw = Draw::new(0x9e37_79b9_7f4a_7c15);

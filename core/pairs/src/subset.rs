@@ -1,16 +1,16 @@
 //! A choice of views for work that grows with their square.
 
 /// Most views that go into work over all pairs of views: 11 175 pairs, which take the slowest closed form a few
-/// hundredths of a second. What starts from them is refined with all views.
+/// hundredths of a second. Their results are refined with all views.
 pub const MOST_VIEWS: usize = 150;
 
-/// Fractional part of the golden ratio: its multiples fill a circle evenly and never fall into step with a period.
+/// Fractional part of the golden ratio: its multiples fill a circle evenly and never match a period.
 const GOLDEN: f64 = 0.618_033_988_749_894_8;
 
 /// `most` of the indices below `count`, in order; all of them when there are no more.
 ///
 /// The choice is the same every time and even over the whole session. It takes the indices whose multiple of the golden
-/// ratio has the smallest fractional part, so it does not fall into step with a session that visits its poses in turn,
+/// ratio has the smallest fractional part, so it does not match the period of a session that visits its poses in turn,
 /// as every n-th view would.
 pub fn spread(count: usize, most: usize) -> Vec<usize> {
     if count <= most {
@@ -42,7 +42,7 @@ mod tests {
             for i in chosen {
                 count[i % period] += 1;
             }
-            // An even share for every pose, give or take a third.
+            // An even share for every pose, within a third.
             let share = 150 / period;
             assert!(count.iter().all(|&c| c * 3 >= share * 2 && c * 3 <= share * 4 + 3), "{period}: {count:?}");
         }

@@ -1,10 +1,10 @@
-//! Capsules: the shapes that arms and what hangs on them are made of, and how far they are from each other and from boxes.
+//! Capsules: the shapes that arms and their attachments are made of, and their distances from each other and from boxes.
 
 use nalgebra::{Isometry3, Point3};
 
 use super::surroundings::Obstacle;
 
-/// Halvings, by the golden section, of where along a capsule it is nearest to a box: to a 2000th of its length.
+/// Halvings, by the golden section, of the place along a capsule that is nearest to a box: to a 2000th of its length.
 const SECTIONS: usize = 16;
 /// The golden section.
 const GOLDEN: f64 = 0.618_033_988_749_894_8;
@@ -16,7 +16,7 @@ pub struct Capsule {
     pub from: Point3<f64>,
     /// The other.
     pub to: Point3<f64>,
-    /// Metres.
+    /// Radius, metres.
     pub radius_m: f64,
 }
 
@@ -27,7 +27,7 @@ impl Capsule {
         Self { from: to_frame * self.from, to: to_frame * self.to, radius_m: self.radius_m }
     }
 
-    /// Between its ends, metres.
+    /// Length between its ends, metres.
     pub(crate) fn length_m(&self) -> f64 {
         (self.to - self.from).norm()
     }
@@ -37,8 +37,8 @@ impl Capsule {
         segment_distance([self.from, self.to], [other.from, other.to]) - self.radius_m - other.radius_m
     }
 
-    /// Distance from a box, metres, with the capsule in the base; below zero where they overlap, by how far the capsule is in
-    /// it. To a millimetre for a link of a metre, and never too small by more than rounding.
+    /// Distance from a box, metres, with the capsule in the base; below zero where they overlap, by the depth of the overlap.
+    /// Accurate to a millimetre for a link of a metre, and never too small by more than rounding.
     pub(crate) fn distance_to_box(&self, obstacle: &Obstacle) -> f64 {
         // The distance from something convex is convex along a line, so its least value is found by sections.
         let at = |part: f64| obstacle.distance_to(&(self.from + (self.to - self.from) * part));
@@ -62,7 +62,8 @@ impl Capsule {
         least - self.radius_m
     }
 
-    /// Less than [`Self::distance_to_box`] by no more than the length, from one look: most boxes are far away.
+    /// A lower bound of [`Self::distance_to_box`], too small by no more than the length, from one evaluation: most
+    /// boxes are far away.
     pub(crate) fn at_least_from_box(&self, obstacle: &Obstacle) -> f64 {
         let middle = nalgebra::center(&self.from, &self.to);
         obstacle.distance_to(&middle) - 0.5 * self.length_m() - self.radius_m
@@ -77,7 +78,7 @@ fn segment_distance(first: [Point3<f64>; 2], second: [Point3<f64>; 2]) -> f64 {
     let d2 = second[1] - second[0];
     let r = first[0] - second[0];
     let (a, e, f) = (d1.norm_squared(), d2.norm_squared(), d2.dot(&r));
-    // A segment of no length is a point: its parameter is of no consequence.
+    // A segment of no length is a point: its parameter does not matter.
     let clamp = |numerator: f64, denominator: f64| {
         if denominator > 1e-12 { (numerator / denominator).clamp(0.0, 1.0) } else { 0.0 }
     };

@@ -1,4 +1,4 @@
-//! What hangs on the tip, besides the tool itself: a camera, or a board.
+//! What is mounted on the tip in addition to the tool: a camera, or a board.
 
 use nalgebra::{Isometry3, Point3};
 
@@ -9,24 +9,24 @@ use handeye_geometry::targets::TargetSpec;
 
 /// Radius of a camera's housing, metres.
 const HOUSING_RADIUS_M: f64 = 0.03;
-/// How far it goes on behind the lens, metres.
+/// Its length behind the lens, metres.
 const HOUSING_M: f64 = 0.03;
-/// Radius of the capsules that a board is made of: it counts as thicker than it is by less than a centimetre on each side.
+/// Radius of the capsules that a board is made of: they make it thicker than it is by less than a centimetre on each side.
 const PLATE_RADIUS_M: f64 = 0.01;
-/// Distance of two of them: midway they are still 4 mm thick on each side, more than what is printed on.
+/// Distance between two of them: midway they are still 4 mm thick on each side, more than the sheet.
 const PLATE_PITCH_M: f64 = 0.018;
 /// How far they begin inside the edge: their round ends reach over it, and still cover the corners.
 const PLATE_INSET_M: f64 = 0.004;
 /// Capsules of a board at most; those of a board that is wider than about half a metre are thicker instead.
 const MOST_PLATE_CAPSULES: usize = 30;
 
-/// What hangs on the tip, as capsules in the frame of the tip.
+/// What is mounted on the tip, as capsules in the frame of the tip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Carried {
     capsules: Vec<Capsule>,
     /// The camera, which has to stay in the work volume as the tip does.
     watched: Option<Point3<f64>>,
-    /// Whether it is as wide as the wrist is long, so that it may come to touch the wrist.
+    /// Whether it is as wide as the wrist is long, so that it may touch the wrist.
     is_wide: bool,
 }
 
@@ -39,7 +39,7 @@ impl Carried {
         Self { capsules: vec![housing], watched: Some(lens), is_wide: false }
     }
 
-    /// A board with the whole of its sheet, and as much room about it as it may be from where it is taken to be, metres.
+    /// A board with the whole of its sheet, with a margin for the uncertainty of its place, metres.
     pub(crate) fn board(target: &TargetSpec, tip_from_target: &Pose<Tip, Target>, room_m: f64) -> Self {
         let (centre, extent, square_m) = (target.centre(), target.extent(), target.grid().square_m);
         let edges_m = [extent.x, extent.y].map(|points_m| points_m + 2.0 * SHEET_EDGE_SQUARES * square_m);
@@ -88,7 +88,7 @@ mod tests {
     use crate::Obstacle;
     use handeye_geometry::testing::BOARD;
 
-    /// Against the sheet itself, point by point.
+    /// Compared with the sheet itself, point by point.
     #[test]
     fn a_board_is_as_large_as_its_sheet_to_a_centimetre() {
         let tip_from_target = Isometry3::new(Vector3::new(0.02, -0.01, 0.05), Vector3::new(0.3, 2.0, -0.4));
@@ -111,7 +111,7 @@ mod tests {
             assert!(by_capsules <= by_points + 1e-3, "{by_capsules} m is farther than {by_points} m");
             assert!(by_capsules > by_points - 0.0115, "{by_capsules} m is nearer than {by_points} m");
         }
-        // No hole that something thin could stand in.
+        // No hole that something thin could be in.
         for point in &sheet {
             let probe = Obstacle::new("probe", Isometry3::translation(point.x, point.y, point.z), [0.0; 3]);
             assert!(board.capsules().iter().any(|c| c.distance_to_box(&probe) < 0.0), "{point}");

@@ -1,4 +1,5 @@
-//! What a configuration of the arm fills, with the links as capsules, and how near the arm is to itself.
+//! The space that a configuration of the arm occupies, with the links as capsules, and the distance of the arm from
+//! itself.
 
 use nalgebra::{Isometry3, Point3};
 
@@ -8,14 +9,14 @@ use handeye_arm::links::{self, LinkCapsule};
 use handeye_arm::{self as arm, ArmFrames, JointKind, JointValues};
 use handeye_geometry::frames::{Base, Pose, Tip};
 
-/// How far the upper arm runs beside the plane through the shoulder, along the shoulder axis.
+/// Offset of the upper arm from the plane through the shoulder, along the shoulder axis.
 const UPPER_ARM_BESIDE_M: f64 = 0.136;
 /// The same for the forearm.
 const FOREARM_BESIDE_M: f64 = 0.016;
 /// Gap that the arm keeps from itself.
 pub(super) const SELF_CLEARANCE_M: f64 = 0.01;
 const TOOL_RADIUS_M: f64 = 0.03;
-/// A bound of how far the body of a link is from its axes, metres.
+/// An upper bound of the distance of the body of a link from its axes, metres.
 const BESIDE_AXES_M: f64 = 0.22;
 
 /// Largest joint movement, radians; a metre of a prismatic joint counts as much as a radian.
@@ -23,46 +24,46 @@ pub fn travel(from: &[f64], to: &[f64]) -> f64 {
     from.iter().zip(to).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// How the links of an arm fill the room around its axes.
+/// The bodies of the links of an arm around its axes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ArmBody {
-    /// As those of the UR5, whose tubes run beside its axes.
+    /// Those of the UR5, whose tubes are offset from its axes.
     Ur5,
     /// Straight from joint to joint, see [`links`].
     Links(Vec<LinkCapsule>),
 }
 
 impl ArmBody {
-    /// That of an arm of which only the chain is known.
+    /// The body of an arm of which only the chain is known.
     pub fn of(chain: &arm::Arm) -> Self {
         Self::Links(links::capsules(chain))
     }
 }
 
-/// The arm with what it carries, as far as collisions go.
+/// The arm with what it carries, for collision checks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Arm {
     /// Its chain, from the arm frame to the connection, with the ranges of its joints.
     pub chain: arm::Arm,
-    /// How its links fill the room.
+    /// The bodies of its links.
     pub body: ArmBody,
     /// Pose of the arm frame in the world.
     pub world_from_arm: Isometry3<f64>,
     /// Pose of the tip in the connection.
     pub connection_from_tip: Isometry3<f64>,
-    /// What hangs on its tip: the camera, or the board.
+    /// What is mounted on its tip: the camera, or the board.
     pub carried: Vec<Carried>,
 }
 
-/// What a configuration of the arm fills.
+/// The space that a configuration of the arm occupies.
 pub(super) struct Filled {
-    /// All that can come to touch something else, in the base.
+    /// All parts that can touch something else, in the base.
     pub moving: Vec<Capsule>,
-    /// How near the arm is to itself and to what it carries, metres; infinite for one that cannot be.
+    /// Distance of the arm from itself and from what it carries, metres; infinite where a collision is impossible.
     pub itself_m: f64,
     /// Tip and camera, in the base.
     pub watched: Vec<Point3<f64>>,
-    /// The links, in the base, but for the last one, which holds what is on the tip.
+    /// The links, in the base, except the last one, which holds what is on the tip.
     pub inner: Vec<Capsule>,
 }
 
@@ -75,10 +76,10 @@ struct Ur5Body {
     hand: Hand,
 }
 
-/// Tool, and what hangs on it.
+/// Tool, and what is mounted on it.
 struct Hand {
     tool: Capsule,
-    /// Each with whether it is wide.
+    /// What is carried, each with whether it is wide.
     carried: Vec<(Capsule, bool)>,
 }
 
@@ -89,7 +90,7 @@ impl Arm {
         JointValues::try_from(&found[..]).ok()
     }
 
-    /// Where the tip is with these joint values; `None` for values that are not those of the arm.
+    /// Pose of the tip with these joint values; `None` for values that are not those of the arm.
     pub fn tip(&self, joints: &[f64]) -> Option<Pose<Base, Tip>> {
         let arm_from_connection = *self.chain.forward(joints).ok()?.isometry();
         Some(Pose::from_isometry(self.world_from_arm * arm_from_connection * self.connection_from_tip))
@@ -100,8 +101,9 @@ impl Arm {
         Pose::from_isometry(self.world_from_arm.inverse() * world_from_connection)
     }
 
-    /// Its joints in a view from there, as [`View::tip_from_joints`](handeye_geometry::targets::observation::View::tip_from_joints),
-    /// where it gets there from `seed` on; empty where it does not.
+    /// Its joints in a view with the tip there, as
+    /// [`View::tip_from_joints`](handeye_geometry::targets::observation::View::tip_from_joints), where it gets there from `seed`;
+    /// empty where it does not.
     pub(crate) fn tip_from_joints(&self, base_from_tip: &Pose<Base, Tip>, seed: &[f64]) -> Vec<Isometry3<f64>> {
         let joints = self.chain.inverse_nearby(&self.arm_from_connection(base_from_tip), seed);
         let Some(joints) = joints else { return Vec::new() };
@@ -109,7 +111,7 @@ impl Arm {
         self.chain.tip_from_joints(&arm_from_tip, &joints).unwrap_or_default()
     }
 
-    /// What it fills with these joint values; `None` for values that are not those of the arm.
+    /// The space that it occupies with these joint values; `None` for values that are not those of the arm.
     pub(super) fn filled(&self, joints: &[f64]) -> Option<Filled> {
         let frames = self.chain.frames(joints).ok()?;
         let arm_from_connection = frames.base_from_flange * self.chain.flange_from_tip;
@@ -141,7 +143,8 @@ impl Arm {
         })
     }
 
-    /// A bound of how far any point of the arm and of what it carries moves on the straight path in joint space, metres.
+    /// An upper bound of the path length of any point of the arm and of what it carries on the straight path in joint
+    /// space, metres.
     pub(super) fn longest_way_m(&self, from: &[f64], to: &[f64]) -> f64 {
         let Ok(frames) = self.chain.frames(from) else { return f64::INFINITY };
         let origin = |pose: &Isometry3<f64>| Point3::from(pose.translation.vector);
@@ -209,7 +212,7 @@ struct LinksBody {
 }
 
 impl LinksBody {
-    /// What stands on the ground does not move.
+    /// The links, except those that are fixed to the ground.
     fn moving(&self) -> Vec<Capsule> {
         self.links.iter().filter(|(link, _)| *link > 0).map(|(_, capsule)| *capsule).chain(self.hand.all()).collect()
     }
@@ -219,8 +222,8 @@ impl LinksBody {
         self.links.iter().filter(|(link, _)| Some(*link) != last).map(|(_, capsule)| *capsule).collect()
     }
 
-    /// Two that have no more between them than their own thickness touch by design, and so do those that share a joint, and
-    /// what is on the last link does with that one: as far as it reaches back along it, it is on the one before too.
+    /// Two links with no more between them than their own thickness touch by design, and so do those that share a joint,
+    /// and what is on the last link with that link: where it reaches back along the whole of it, also with the one before.
     fn distance_from_itself_m(&self) -> f64 {
         let links: Vec<Capsule> = self.links.iter().map(|(_, capsule)| *capsule).collect();
         // What is between two links, by adding up from the base.

@@ -1,4 +1,4 @@
-//! What an arm would come too near to, at a configuration and along a path.
+//! What an arm would come too close to, at a configuration and along a path.
 
 use nalgebra::Point3;
 
@@ -9,26 +9,26 @@ use super::travel;
 use handeye_wording::Text;
 use handeye_wording::text;
 
-/// Between two configurations that a path is checked at nothing comes nearer than allowed by more than half of this, metres.
+/// Between two checked configurations of a path nothing comes closer than allowed by more than half of this, metres.
 const PATH_GAP_M: f64 = 0.01;
-/// Parts of a path over which the speed of the tip is looked at: with 48 it was more than 1 % too fast between two of them on one
+/// Parts of a path over which the speed of the tip is checked: with 48 it was more than 1 % too fast between two of them on one
 /// move in 200.
 const SPEED_SAMPLES: usize = 320;
 
-/// The configuration that a motion began with is allowed, up to rounding, metres.
+/// Tolerance with which the start configuration of a motion is allowed, metres: rounding.
 const ROUNDING_M: f64 = 1e-9;
 
-/// What is too near.
+/// What is too close.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum Contact {
-    /// Something that stands around.
+    /// An obstacle.
     #[error("the arm, or what it carries, would come too near to {name:?}: go another way")]
     Box {
-        /// Its name, as the file of the surroundings has it.
+        /// Its name in the file of the surroundings.
         name: String,
     },
-    /// The arm itself, or what hangs on its tip.
+    /// The arm itself, or what is mounted on its tip.
     #[error("the arm would touch itself, or what it carries: go another way")]
     Itself,
     /// The end of the work volume.
@@ -40,7 +40,7 @@ pub enum Contact {
 }
 
 impl Contact {
-    /// What stands where the arm is, in the words of a person who is asked to move it away.
+    /// What is at the place of the arm, in words that ask a person to move it away.
     pub fn here(&self) -> Text {
         match self {
             Self::Box { name } => text!("too near to “{name}”", name = name),
@@ -51,17 +51,17 @@ impl Contact {
     }
 }
 
-/// How near the arm may come to each thing, metres.
+/// Smallest allowed distance from each thing, metres.
 #[derive(Debug)]
 struct Allowed {
     itself: f64,
     volume: f64,
-    /// Of each obstacle, in their order.
+    /// The distance from each obstacle, in their order.
     boxes: Vec<f64>,
 }
 
-/// An arm among what stands around it, with how near it may come to each thing: the clearance, or, where it begins nearer
-/// than that, no nearer than it begins. So it always gets away from what it touches.
+/// An arm and its surroundings, with the allowed distance from each thing: the clearance or, where it begins closer than
+/// that, the distance at the start. So it can always move away from what it touches.
 #[derive(Debug)]
 pub struct Guard<'a> {
     arm: &'a Arm,
@@ -76,7 +76,7 @@ impl Allowed {
 }
 
 impl<'a> Guard<'a> {
-    /// For a motion that begins at these joint values, with this much free space, metres.
+    /// The guard of a motion that begins at these joint values, with this clearance, metres.
     pub fn from(arm: &'a Arm, around: &'a Surroundings, joints: &[f64], clearance_m: f64) -> Self {
         let mut allowed = Allowed::all(around, clearance_m);
         if let Some(filled) = arm.filled(joints) {
@@ -89,7 +89,7 @@ impl<'a> Guard<'a> {
         Self { arm, around, allowed }
     }
 
-    /// For a plan, which has to keep the whole clearance everywhere.
+    /// The guard of a plan, which has to keep the whole clearance everywhere.
     pub fn strict(arm: &'a Arm, around: &'a Surroundings, clearance_m: f64) -> Self {
         Self { arm, around, allowed: Allowed::all(around, clearance_m) }
     }
@@ -98,25 +98,25 @@ impl<'a> Guard<'a> {
         self.arm
     }
 
-    /// What stands around.
+    /// The surroundings.
     pub fn surroundings(&self) -> &Surroundings {
         self.around
     }
 
-    /// What the arm is too near to with these joint values.
+    /// What the arm is too close to with these joint values.
     pub fn contact(&self, joints: &[f64]) -> Option<Contact> {
         self.room(joints, 0.0).err()
     }
 
-    /// What the arm comes too near to on the straight path in joint space, its ends left out. Checked along its whole length:
-    /// in steps that are shorter the nearer something is.
+    /// What the arm comes too close to on the straight path in joint space, its ends excluded. Checked along its whole
+    /// length, in steps that are shorter the closer something is.
     pub fn contact_on_path(&self, from: &[f64], to: &[f64]) -> Option<Contact> {
         let longest_m = self.arm.longest_way_m(from, to);
         if !longest_m.is_finite() {
             return Some(Contact::NoConfiguration);
         }
         let at = |part: f64| -> Vec<f64> { from.iter().zip(to).map(|(from, to)| from + part * (to - from)).collect() };
-        // As near to its beginning as the shortest step.
+        // One shortest step from its beginning.
         let mut part = PATH_GAP_M / longest_m.max(PATH_GAP_M);
         while part < 1.0 {
             match self.room(&at(part), f64::INFINITY) {
@@ -127,8 +127,8 @@ impl<'a> Guard<'a> {
         None
     }
 
-    /// What is next to the arm with these joint values, and how much nearer it may come to that, metres: less than 0 where it is
-    /// too near. Only what is nearer than allowed by less than `within_m` is looked for; `None` where nothing is.
+    /// What is nearest to the arm with these joint values, and how much closer it may come to that, metres: less than 0 where it
+    /// is too close. Only things with less than `within_m` left are searched for; `None` where there are none.
     pub fn nearest(&self, joints: &[f64], within_m: f64) -> Option<(f64, Contact)> {
         let Some(filled) = self.arm.filled(joints) else { return Some((f64::NEG_INFINITY, Contact::NoConfiguration)) };
         let mut least_m = within_m;
@@ -153,7 +153,7 @@ impl<'a> Guard<'a> {
         Some((least_m, contact))
     }
 
-    /// How much nearer the arm may come to whatever is next, metres, as far as that is less than `up_to_m`; or what is too near.
+    /// How much closer the arm may come to what is nearest, metres, at most `up_to_m`; or what is too close.
     fn room(&self, joints: &[f64], up_to_m: f64) -> Result<f64, Contact> {
         match self.nearest(joints, up_to_m) {
             Some((room_m, contact)) if room_m < -ROUNDING_M => Err(contact),
@@ -163,12 +163,12 @@ impl<'a> Guard<'a> {
     }
 }
 
-/// What is looked at for the nearest.
+/// The candidates for the nearest thing.
 #[derive(Clone, Copy)]
 enum Nearby {
     Itself,
     Volume,
-    /// By its place among the obstacles.
+    /// A box, by its place among the obstacles.
     Box(usize),
 }
 
@@ -179,7 +179,7 @@ impl Filled {
         self.watched.iter().map(|point: &Point3<f64>| volume.depth_m(point)).fold(f64::INFINITY, f64::min)
     }
 
-    /// How far the arm is from a box, metres, where that is less than `below_m`; otherwise any value that is not.
+    /// Distance of the arm from a box, metres, where that is less than `below_m`; otherwise any value that is not.
     fn distance_m(&self, obstacle: &Obstacle, below_m: f64) -> f64 {
         self.moving.iter().fold(f64::INFINITY, |least: f64, capsule: &Capsule| {
             if capsule.at_least_from_box(obstacle) >= least.min(below_m) {
@@ -191,8 +191,8 @@ impl Filled {
 }
 
 impl Arm {
-    /// Whether the arm, its tool and what it carries keep their distance from all that stands around and from the arm itself,
-    /// in the work volume; values that are not those of its joints are nowhere free.
+    /// Whether the arm, its tool and what it carries keep their distance from all obstacles and from the arm itself, in the
+    /// work volume; values that are not those of its joints are never free.
     pub fn is_free(&self, joints: &[f64], around: &Surroundings, clearance_m: f64) -> bool {
         self.contact(joints, around, clearance_m).is_none()
     }
@@ -202,13 +202,13 @@ impl Arm {
         Guard::strict(self, around, clearance_m).contact(joints)
     }
 
-    /// Whether the straight path in joint space between two configurations touches nothing; its ends are not looked at.
+    /// Whether the straight path in joint space between two configurations touches nothing; its ends are not checked.
     pub(crate) fn path_is_free(&self, from: &[f64], to: &[f64], around: &Surroundings, clearance_m: f64) -> bool {
         Guard::strict(self, around, clearance_m).contact_on_path(from, to).is_none()
     }
 
-    /// How fast the joint with the longest way may go on the straight path in joint space, rad/s, so that limits of joints and
-    /// tip are kept; `wanted_rad_s` where they allow that. A joint that shifts counts as one that turns.
+    /// Largest speed of the joint with the longest motion on the straight path in joint space, rad/s, that keeps the limits of
+    /// joints and tip; `wanted_rad_s` where they allow that. A prismatic joint counts like a revolute one.
     pub fn joint_speed(&self, from: &[f64], to: &[f64], around: &Surroundings, wanted_rad_s: f64) -> f64 {
         let speed_rad_s = around.limits.joint(wanted_rad_s);
         let Some(tip_m_s) = around.limits.tip_m_s else { return speed_rad_s };

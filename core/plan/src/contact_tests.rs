@@ -30,7 +30,7 @@ fn turned(by_rad: f64) -> Vec<f64> {
     joints
 }
 
-/// A post where the hand comes to when the first joint has turned so far.
+/// A post where the hand arrives when the first joint has turned by this angle.
 fn post(arm: &Arm, at_rad: f64) -> Surroundings {
     let at = arm.tip(&turned(at_rad)).expect("its joints").translation();
     Surroundings::of(vec![Obstacle::new("post", Isometry3::from(at), [0.04, 0.04, 0.6])])
@@ -76,7 +76,7 @@ fn an_arm_that_touches_something_gets_away_from_it_and_not_further_in() {
         assert!(guard.contact(&turned(inside_rad + 0.01)).is_some(), "from {inside_rad}");
         assert!(guard.contact_on_path(&turned(inside_rad), &turned(inside_rad + 0.1)).is_some());
     }
-    // One that begins in free space keeps the whole clearance.
+    // A motion that begins in free space keeps the whole clearance.
     let guard = Guard::from(&arm, &around, &turned(0.0), CLEARANCE_M);
     assert!(guard.contact(&turned(0.5)).is_some());
 }
@@ -89,7 +89,7 @@ fn a_board_on_the_tip_keeps_away_from_what_stands_around_by_its_edge() {
     let bare = arm(Vec::new());
     let joints = start();
     let tip = *with_board.tip(&joints).expect("its joints").isometry();
-    // Its half edge is 10 cm; 8 cm beside the tip, 5 cm in front of it, there is nothing but the board.
+    // Its half edge is 10 cm; 8 cm to the side of the tip and 5 cm in front of it there is only the board.
     let beside = tip * nalgebra::Translation3::new(0.08, 0.0, 0.05);
     let around = Surroundings::of(vec![Obstacle::new("pin", beside, [0.01; 3])]);
     assert!(bare.is_free(&joints, &around, CLEARANCE_M));
@@ -100,7 +100,7 @@ fn a_board_on_the_tip_keeps_away_from_what_stands_around_by_its_edge() {
         turned[5] = f64::from(k) * 0.5;
         assert!(with_board.is_free(&turned, &Surroundings::default(), CLEARANCE_M), "{turned:?}");
     }
-    // Bent back by its wrist the hand alone comes past the forearm and the board does not.
+    // Bent back at the wrist the hand alone clears the forearm and the board does not.
     let hits = |arm: &Arm| -> usize {
         let bent = (0..60).filter(|k| {
             let mut bent = joints.clone();
@@ -131,7 +131,7 @@ fn tip_and_camera_stay_in_the_work_volume() {
     let around = about(0.11, &tip);
     let guard = Guard::from(&arm, &around, &joints, CLEARANCE_M);
     assert_eq!(guard.contact_on_path(&joints, &turned(1.0)), Some(Contact::Volume));
-    // One that stands outside comes back in, and goes no further out.
+    // An arm that is outside comes back in, and goes no further out.
     let guard = Guard::from(&arm, &around, &turned(1.0), CLEARANCE_M);
     assert_eq!(guard.contact(&turned(0.9)), None);
     assert_eq!(guard.contact(&turned(1.1)), Some(Contact::Volume));

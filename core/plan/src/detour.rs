@@ -1,7 +1,7 @@
-//! A way around what is in the way: through configurations of which each is reached straight in joint space from the one before.
+//! A path around obstacles: through configurations each of which is reached straight in joint space from the one before.
 //!
 //! Two trees of free configurations grow towards one another from both ends. Reference: Kuffner and LaValle 2000, "RRT-Connect: an
-//! efficient approach to single-query path planning". What is found is then shortened, because random ways are long.
+//! efficient approach to single-query path planning". The path found is then shortened, because random paths are long.
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -14,15 +14,16 @@ use handeye_geometry::progress::CancelToken;
 
 /// Longest leg of a tree [rad, m of a prismatic joint]: some of them make the turn of a joint.
 const STEP: f64 = 0.4;
-/// Random configurations that are grown towards. A way around one thing takes tens; what takes more is found by a person sooner.
+/// Random configurations that are grown towards. A path around one obstacle takes tens; what takes more is found sooner by a
+/// person.
 const MOST_DRAWS: usize = 1500;
-/// By how much a joint leaves the values at both ends at the most [rad, m]: half a turn leads to any side of an arm.
+/// Largest distance of a joint from the values at both ends [rad, m]: half a turn leads to any side of an arm.
 const ASIDE: f64 = std::f64::consts::PI;
-/// Random configurations from which a pose is solved for: an arm of six joints has up to eight ways to be there.
+/// Random configurations from which a pose is solved: an arm of six joints has up to eight solutions.
 const MOST_SEEDS: usize = 24;
 /// Solutions nearer to one another are the same [rad, m].
 const SAME: f64 = 0.05;
-/// Solutions to which a way is looked for, the nearest first.
+/// Solutions to which a path is searched, the nearest first.
 const MOST_ENDS: usize = 3;
 
 #[derive(Debug)]
@@ -35,7 +36,8 @@ impl Tree {
         Self { nodes: vec![(root, 0)] }
     }
 
-    /// Grows from its nearest node straight towards a configuration, as far as that is free; the last node, and whether it is there.
+    /// Grows from its nearest node straight towards a configuration, as far as that is free; returns the last node, and whether it
+    /// reached the configuration.
     fn grow(&mut self, guard: &Guard<'_>, towards: &JointValues) -> Option<(usize, bool)> {
         let near = |k: &usize| travel(&self.nodes[*k].0, towards);
         let mut last = (0..self.nodes.len()).min_by(|a, b| near(a).total_cmp(&near(b)))?;
@@ -57,7 +59,7 @@ impl Tree {
         }
     }
 
-    /// From a node back to its root.
+    /// The path from a node back to its root.
     fn back(&self, mut node: usize) -> Vec<JointValues> {
         let mut way = vec![self.nodes[node].0];
         while node != 0 {
@@ -69,8 +71,8 @@ impl Tree {
 }
 
 impl Guard<'_> {
-    /// The configurations to go through after `from`, the last one `to`, straight in joint space from each to the next; `None` where
-    /// no way is found. The same question has the same answer.
+    /// The configurations to go through after `from`, the last one `to`, straight in joint space from each to the next; `None`
+    /// where no path is found. The same arguments give the same path.
     pub fn detour(
         &self,
         from: &JointValues,
@@ -113,7 +115,7 @@ impl Guard<'_> {
         None
     }
 
-    /// The same to a pose of the tip, in whatever configuration the arm is there.
+    /// The same to a pose of the tip, in any configuration of the arm.
     pub fn detour_to(
         &self,
         from: &JointValues,
@@ -139,7 +141,7 @@ impl Guard<'_> {
         found.iter().take(MOST_ENDS).find_map(|to| self.detour(from, to, seed, cancel))
     }
 
-    /// From each configuration straight to the last one that is free to go to; without the first.
+    /// The path shortened: from each configuration straight to the last one with a free path; without the first.
     fn shortened(&self, way: &[JointValues]) -> Vec<JointValues> {
         let (mut short, mut at) = (Vec::new(), 0);
         while at + 1 < way.len() {
@@ -151,7 +153,7 @@ impl Guard<'_> {
     }
 }
 
-/// Between which values each joint is looked for.
+/// The range of values in which each joint is searched.
 fn ends(from: &JointValues, to: &JointValues, ranges: &[JointRange]) -> Vec<[f64; 2]> {
     let of_joint = |(i, range): (usize, &JointRange)| {
         let [low, high] = [from[i].min(to[i]) - ASIDE, from[i].max(to[i]) + ASIDE];

@@ -1,4 +1,4 @@
-//! Where to take the next views from: what they would add to the answer, and whether the arm gets there without touching
+//! Where to take the next views: what they would add to the answer, and whether the arm gets there without touching
 //! anything.
 //!
 //! ```
@@ -13,8 +13,8 @@
 //! assert!((obstacle.size_m[0] - (0.2 + 0.1 + 0.04)).abs() < 1e-12);
 //! ```
 //!
-//! [`guided`] chooses poses one by one until the stated error is reached, [`views_of_board`] a set of them at once, [`travel`] says
-//! whether a way is free. Nothing here moves an arm. Never depends on images, files or sockets.
+//! [`guided`] chooses poses one by one until the stated error is reached, [`views_of_board`] gives a set of them at once, [`Guard`]
+//! checks whether a path is free. Nothing here moves an arm. Never depends on images, files or sockets.
 
 #![warn(missing_docs)]
 
@@ -48,17 +48,17 @@ use nalgebra::Translation3;
 use handeye_geometry::frames::{Base, Camera, Pose, Target};
 use handeye_geometry::targets::TargetSpec;
 
-/// What is printed on has an edge about the pattern; this much of it on each side, in squares.
+/// The sheet has a margin around the pattern: its width on each side, in squares.
 const SHEET_EDGE_SQUARES: f64 = 2.0;
-/// Thickness of what is printed on \[m\].
+/// Thickness of the sheet \[m\].
 const SHEET_M: f64 = 0.002;
 
-/// Edge of the cube that a camera beside the robot is taken for, metres: a usual housing with its cable.
+/// Edge of the cube that models a camera next to the robot, metres: a usual housing with its cable.
 const CAMERA_M: f64 = 0.1;
-/// How far the middle of that cube is behind the lens, metres.
+/// Distance of the middle of that cube behind the lens, metres.
 const CAMERA_BEHIND_LENS_M: f64 = 0.03;
 
-/// The board as something that the arm must not touch, with some room about it, metres.
+/// The board as something that the arm must not touch, with a margin around it, metres.
 pub fn sheet(target: &TargetSpec, base_from_target: &Pose<Base, Target>, room_m: f64) -> Obstacle {
     let (centre, extent, square_m) = (target.centre(), target.extent(), target.grid().square_m);
     let edge_m = |points_m: f64| points_m + 2.0 * SHEET_EDGE_SQUARES * square_m;
@@ -67,8 +67,8 @@ pub fn sheet(target: &TargetSpec, base_from_target: &Pose<Base, Target>, room_m:
     Obstacle::new("board", centre, size_m)
 }
 
-/// A camera beside the robot as something that the arm must not touch, with some room about it, metres: a cube of 10 cm, of
-/// which the lens is 2 cm behind the front.
+/// A camera next to the robot as something that the arm must not touch, with a margin around it, metres: a cube of 10 cm,
+/// of which the lens is 2 cm behind the front.
 pub fn housing(base_from_camera: &Pose<Base, Camera>, room_m: f64) -> Obstacle {
     let centre = base_from_camera.isometry() * Translation3::new(0.0, 0.0, -CAMERA_BEHIND_LENS_M);
     Obstacle::new("camera", centre, [CAMERA_M + 2.0 * room_m; 3])

@@ -1,25 +1,25 @@
-//! How long joints take from one place to another.
+//! Duration of joint motions.
 
 /// The limits of a joint that moves from rest to rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pace {
-    /// rad/s.
+    /// Largest speed, rad/s.
     pub speed: f64,
-    /// rad/s².
+    /// Largest acceleration, rad/s².
     pub acceleration: f64,
-    /// rad/s³; infinite where it is not limited.
+    /// Largest jerk, rad/s³; infinite where it is not limited.
     pub jerk: f64,
 }
 
 impl Pace {
-    /// The same motions in slower time: at half the speed each takes twice as long.
+    /// The same motions slowed down: at half the speed each takes twice as long.
     #[must_use]
     pub fn slower(&self, share: f64) -> Self {
         let Self { speed, acceleration, jerk } = *self;
         Self { speed: speed * share, acceleration: acceleration * share.powi(2), jerk: jerk * share.powi(3) }
     }
 
-    /// The shortest time in which a joint goes so far \[rad\], seconds.
+    /// The shortest time in which a joint moves by this angle \[rad\], seconds.
     ///
     /// Source: Biagiotti and Melchiorri, "Trajectory Planning for Automatic Machines and Robots", 2008, section 3.4 (double S
     /// velocity profile with zero speed at both ends).

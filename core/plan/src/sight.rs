@@ -1,4 +1,4 @@
-//! The line of sight between a camera and a board, of which one is on the tip: nothing of the arm may be in it.
+//! The line of sight between a camera and a board, one of them on the tip: no part of the arm may be in it.
 
 use nalgebra::{Point3, Vector3};
 
@@ -8,25 +8,25 @@ use handeye_estimate::handeye::HandEye;
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_geometry::targets::TargetSpec;
 
-/// Points of a board that are looked at are no farther apart than this, metres: a link is thicker.
+/// Largest distance between the points of a board that are checked, metres: a link is thicker.
 const PITCH_M: f64 = 0.05;
 /// Most of them along an edge.
 const MOST: usize = 9;
-/// What is so near to camera or board, metres, is what holds it, and hides as much in every view.
+/// What is this close to camera or board, metres, is its holder, and hides the same in every view.
 const HELD_M: f64 = 0.05;
-/// Free space about a line of sight, metres: what a link is thicker than its capsule.
+/// Free space about a line of sight, metres: by as much a link may be thicker than its capsule.
 const ROOM_M: f64 = 0.01;
 
 /// A camera and a board that it is to see.
 #[derive(Debug, Clone)]
 pub struct Sight {
     hand_eye: HandEye,
-    /// All over the board, in its frame.
+    /// Points all over the board, in its frame.
     points: Vec<Point3<f64>>,
 }
 
 impl Sight {
-    /// By where an estimate has both of them.
+    /// The line of sight by the estimated poses of both.
     pub(crate) fn new(hand_eye: &HandEye, target: &TargetSpec) -> Self {
         let (centre, extent) = (target.centre(), target.extent());
         let parts = |extent_m: f64| ((extent_m / PITCH_M).ceil() as usize).clamp(1, MOST - 1);
@@ -40,7 +40,7 @@ impl Sight {
         Self { hand_eye: *hand_eye, points: points.collect() }
     }
 
-    /// Whether nothing of an arm with these joint values, at which it has its tip there, is between camera and board.
+    /// Whether no part of an arm with these joint values, which put its tip there, is between camera and board.
     pub(crate) fn is_free(&self, arm: &Arm, joints: &[f64], base_from_tip: &Pose<Base, Tip>) -> bool {
         let Some(filled) = arm.filled(joints) else { return false };
         let tip = base_from_tip.isometry();
@@ -76,7 +76,7 @@ mod tests {
     use handeye_geometry::testing::BOARD;
 
     /// A camera beyond the forearm does not see the board behind it, and one on the other side does; all links of the wrist are
-    /// about the board in both.
+    /// near the board in both cases.
     #[test]
     fn a_link_between_camera_and_board_hides_it_wherever_the_camera_stands() {
         let chain = ArmKind::Ur5e.arm();

@@ -12,34 +12,34 @@ use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_geometry::targets::TargetSpec;
 
-/// Directions in which a board goes that may be elsewhere at once; between two of them it goes no farther out of the image than by
-/// 8 % of the way.
+/// Number of directions in which a board may move that are checked; between two of them it leaves the image by no more than 8 % of
+/// the distance.
 const DIRECTIONS: u32 = 8;
 
-/// What the planner knows of a cell. Being a centimetre or a few degrees off costs nothing but margin, so estimates and
-/// drawings do.
+/// The planner's model of a cell. Errors of a centimetre or a few degrees only cost margin, so estimates and drawings
+/// are sufficient.
 #[derive(Debug, Clone)]
 pub struct ViewSetup {
-    /// Where the target is.
+    /// Pose of the target.
     pub base_from_target: Pose<Base, Target>,
     /// The target that is to be seen.
     pub target: TargetSpec,
     /// The lens.
     pub intrinsics: Intrinsics,
-    /// Where the camera sits.
+    /// Pose of the camera on the tip.
     pub tip_from_camera: Pose<Tip, Camera>,
     /// The arm and its tool.
     pub arm: Arm,
     /// Configuration to start from; poses are reached without changing over to another branch where possible.
     pub start_joints: JointValues,
-    /// What stands around, the board included.
+    /// The surroundings, including the board.
     pub around: Surroundings,
 }
 
-/// What kind of views are wanted.
+/// Requirements for the views.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ViewOptions {
-    /// How many.
+    /// Number of views.
     pub count: usize,
     /// Seed of the candidates.
     pub seed: u64,
@@ -53,11 +53,11 @@ pub struct ViewOptions {
     pub aim_m: f64,
     /// Free pixels between the printed squares and the edge of the image.
     pub margin_px: f64,
-    /// How far the board may go in its plane at once and still be wholly in the image, with no free pixels; 0 for one that stands.
+    /// Distance that the board may move in its plane and still be wholly in the image, without free pixels; 0 for a board at rest.
     pub leeway_m: f64,
     /// Free space around the arm and its tool.
     pub clearance_m: f64,
-    /// How many random views are tried.
+    /// Number of random views that are tried.
     pub candidates: usize,
 }
 
@@ -81,7 +81,7 @@ impl Default for ViewOptions {
 /// A pose to look at the board from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlannedView {
-    /// Joint values, radians; of a prismatic joint metres.
+    /// Joint values, radians; metres for a prismatic joint.
     pub joints: JointValues,
     /// Tip pose there.
     pub base_from_tip: Pose<Base, Tip>,
@@ -91,7 +91,7 @@ pub struct PlannedView {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum PlanError {
-    /// Fewer views than asked for fit the cell.
+    /// Fewer views than requested fit the cell.
     #[error(
         "only {found} of {wanted} views: of {candidates} tried, {not_in_view} would not show the whole board, \
          {unreachable} are out of the arm's reach, {in_the_way} would touch something and {no_path} cannot be driven \
@@ -105,44 +105,44 @@ pub enum PlanError {
         wanted: usize,
         /// Random views tried.
         candidates: usize,
-        /// Of these, how many do not show the whole board.
+        /// Number of these that do not show the whole board.
         not_in_view: usize,
-        /// How many the arm cannot reach within its limits.
+        /// Number that the arm cannot reach within its limits.
         unreachable: usize,
-        /// How many would touch the arm itself or an obstacle.
+        /// Number that would touch the arm itself or an obstacle.
         in_the_way: usize,
-        /// How many have no free straight path in joint space to every view chosen.
+        /// Number without a free straight path in joint space to every view chosen.
         no_path: usize,
     },
     /// Even the configuration to start from is not free.
     #[error("in the configuration to start from the arm is {there}: move it into free space first", there = by.here())]
     StartBlocked {
-        /// What it is too near to.
+        /// What it is too close to.
         by: Contact,
     },
 }
 
 /// Picks views of the board that differ as much as possible in rotation.
 ///
-/// Random views are drawn from a cone about the board's normal, with any roll, distance and a little aiming beside the
-/// middle. Kept are those that show the whole board, that the arm reaches within its limits and that touch nothing.
-/// From these the one nearest to the start is taken first, then always the one whose rotation is farthest from all
-/// taken so far, provided that the straight path in joint space is free between it and every other, and the start.
-/// So any order of visiting them is safe, and the first few are well spread too.
+/// Random views are drawn from a cone about the board's normal, with any roll, distance and a small random offset of
+/// the aim from the middle. Kept are those that show the whole board, that the arm reaches within its limits and that
+/// touch nothing. From these the one nearest to the start is taken first, then always the one whose rotation is
+/// farthest from all taken so far, provided that the straight path in joint space is free between it and every other,
+/// and the start. So any order of visiting them is safe, and the first few are well spread too.
 ///
 /// The same setup and options give the same views.
 ///
 /// # Errors
-/// [`PlanError`] says what the candidates failed at.
+/// [`PlanError`] states why candidates failed.
 pub fn poses_looking_at(setup: &ViewSetup, options: &ViewOptions) -> Result<Vec<PlannedView>, PlanError> {
     poses_unlike(setup, options, &[])
 }
 
-/// As [`poses_looking_at`], but also as different as possible from views that there are already: the first is the one
-/// whose rotation is farthest from all of `taken`, and none is nearer to one of these than to those chosen before it.
+/// As [`poses_looking_at`], but also as different as possible from existing views: the first is the one whose rotation
+/// is farthest from all of `taken`, and none is nearer to one of these than to those chosen before it.
 ///
 /// # Errors
-/// [`PlanError`] says what the candidates failed at.
+/// [`PlanError`] states why candidates failed.
 pub fn poses_unlike(
     setup: &ViewSetup,
     options: &ViewOptions,
@@ -158,7 +158,7 @@ pub fn poses_unlike(
 }
 
 /// All random views that show the whole board, that the arm reaches and that touch nothing, in the order in which they
-/// were drawn: for who chooses among them by something else.
+/// were drawn: for callers that choose among them by another criterion.
 pub fn views_of_board(setup: &ViewSetup, options: &ViewOptions) -> Vec<PlannedView> {
     Draws::new(setup, options).flatten().collect()
 }
@@ -245,7 +245,7 @@ impl ViewSetup {
         self.arm.is_free(joints, &self.around, clearance_m)
     }
 
-    /// Whether the straight path in joint space between two configurations touches nothing; its ends are not looked at.
+    /// Whether the straight path in joint space between two configurations touches nothing; its ends are not checked.
     pub fn path_is_free(&self, from: &[f64], to: &[f64], clearance_m: f64) -> bool {
         self.arm.path_is_free(from, to, &self.around, clearance_m)
     }
@@ -278,7 +278,7 @@ fn shows_whole_board(setup: &ViewSetup, options: &ViewOptions, target_from_camer
         && shows_within(&setup.intrinsics, &setup.target, &camera_from_target, options.leeway_m)
 }
 
-/// Whether the whole board stays in the image when it goes along its plane by this much, metres.
+/// Whether the whole board stays in the image when it moves in its plane by this much, metres.
 pub fn shows_within(
     intrinsics: &Intrinsics,
     target: &TargetSpec,
@@ -294,7 +294,7 @@ pub fn shows_within(
         })
 }
 
-/// Whether the printed pattern is in the image with so many free pixels.
+/// Whether the printed pattern is in the image with this many free pixels.
 fn shows_outline(
     intrinsics: &Intrinsics,
     target: &TargetSpec,
@@ -304,7 +304,7 @@ fn shows_outline(
     let grid = target.grid();
     let (width, height) = (f64::from(intrinsics.width), f64::from(intrinsics.height));
     let margin = margin_px - 0.5;
-    // The printed pattern goes one square beyond its outermost points; its border bounds it in any lens.
+    // The printed pattern extends one square beyond its outermost points; its border bounds it in any lens.
     let (last_column, last_row) = (grid.columns as i64, grid.rows as i64);
     (-1..=last_row).all(|row| {
         (-1..=last_column).filter(|&column| row == -1 || row == last_row || column == -1 || column == last_column).all(
@@ -318,7 +318,7 @@ fn shows_outline(
     })
 }
 
-/// Greedy farthest-point selection; also counts the candidates that were given up for want of a path.
+/// Greedy farthest-point selection; also counts the candidates that were dropped for lack of a path.
 fn choose(
     setup: &ViewSetup,
     options: &ViewOptions,

@@ -1,4 +1,4 @@
-//! What is black on a target.
+//! The black shapes of a target.
 
 use nalgebra::Vector2;
 
@@ -47,7 +47,7 @@ impl Shape {
         }
     }
 
-    /// Whether a point lies in it.
+    /// Whether a point is in it.
     pub fn contains(&self, p: &Vector2<f64>) -> bool {
         match self {
             Self::Rectangle { corner, size } => {
@@ -62,7 +62,7 @@ impl Shape {
 /// A target as it is drawn: black on white.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drawing {
-    /// What is black. Shapes touch, and do not overlap.
+    /// The black shapes. They touch, and do not overlap.
     pub shapes: Vec<Shape>,
     /// Least white around it in metres.
     pub quiet_m: f64,
@@ -157,7 +157,7 @@ fn cells(dictionary: Dictionary, id: usize, border_bits: usize) -> Result<Vec<bo
     markers::cells(dictionary, id, border_bits).map_err(|e| PrintError::Markers { reason: e.to_string() })
 }
 
-/// The black cells of a marker, those beside each other in a row as one.
+/// The black cells of a marker, adjacent ones in a row as one.
 fn marker(corner: Vector2<f64>, side: f64, cells: &[bool]) -> Vec<Shape> {
     // Cells are a square.
     let n = (cells.len() as f64).sqrt().round() as usize;

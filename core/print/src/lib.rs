@@ -34,14 +34,14 @@ pub enum PrintError {
     /// A number of the target is out of range.
     #[error("the target cannot be drawn: {source}")]
     BadTarget {
-        /// Which, and what it may be.
+        /// The dimension, and its valid range.
         #[from]
         source: BadTarget,
     },
     /// The markers cannot be drawn.
     #[error("the markers cannot be drawn: {reason}")]
     Markers {
-        /// What the library of markers says.
+        /// The error of the marker library.
         reason: String,
     },
     /// The page is too small.

@@ -6,7 +6,7 @@ use super::{Shape, Sheet};
 
 /// Points of a PDF in a millimetre.
 const POINTS_PER_MM: f64 = 72.0 / 25.4;
-/// Handles of a quarter circle drawn as a cubic curve, as a part of the radius: off by 0.03 % of it at the most.
+/// Handles of a quarter circle drawn as a cubic curve, as a part of the radius: with an error of at most 0.03 % of it.
 const HANDLE: f64 = 0.552_284_75;
 
 /// Writes a page. Its coordinates are millimetres from the top left corner, by one transformation at its beginning, so

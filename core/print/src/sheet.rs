@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::{Drawing, PrintError, Shape};
 use handeye_geometry::targets::TargetSpec;
 
-/// What printers leave white \[mm\].
+/// Margin that printers leave white \[mm\].
 const MARGIN_MM: f64 = 10.0;
 /// Strip of a ruler with its numbers \[mm\].
 const RULER_STRIP_MM: f64 = 9.0;
@@ -17,17 +17,17 @@ const RULER_STRIP_MM: f64 = 9.0;
 const RULER_MM: usize = 100;
 /// Strip of the two lines of text \[mm\].
 const TEXT_STRIP_MM: f64 = 10.0;
-/// Least white between the drawing and what stands around it \[mm\].
+/// Smallest white space between the drawing and its surroundings \[mm\].
 const QUIET_MM: f64 = 5.0;
 /// Longest side of a page that PDF readers must take: 14,400 points \[mm\].
 const LONGEST_MM: f64 = 5080.0;
 /// Stroke of ticks \[mm\].
 const TICK_MM: f64 = 0.15;
-/// Largest text \[mm\], and the width of a letter as a part of its size at the most: Helvetica's average is a half.
+/// Largest text \[mm\], and the largest width of a letter as a part of its size: Helvetica's average is a half.
 const TEXT_MM: f64 = 3.5;
 const LETTER: f64 = 0.56;
 
-/// Which page to print on.
+/// Page size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Page {
@@ -87,7 +87,7 @@ pub struct Text {
     pub at_mm: [f64; 2],
     /// Size of the letters \[mm\].
     pub size_mm: f64,
-    /// What it says, in ASCII.
+    /// The text, in ASCII.
     pub text: String,
 }
 
@@ -96,13 +96,13 @@ pub struct Text {
 pub struct Sheet {
     /// Width and height.
     pub size_mm: [f64; 2],
-    /// Where the origin of the target is.
+    /// Position of the target's origin.
     pub origin_mm: [f64; 2],
     /// The target, in metres from there.
     pub drawing: Drawing,
     /// Left end of the horizontal and upper end of the vertical ruler, each of 100 mm.
     pub rulers_mm: [[f64; 2]; 2],
-    /// What stands on it.
+    /// The texts on it.
     pub texts: Vec<Text>,
 }
 
@@ -177,7 +177,7 @@ fn ruler_texts(across: [f64; 2], down: [f64; 2]) -> Vec<Text> {
     let labels = [(0.0, "0"), (50.0, "50"), (100.0, "100 mm")];
     let text = |at_mm, text: &str| Text { at_mm, size_mm: 2.5, text: text.to_owned() };
     let below = labels.iter().map(|(at, label)| text([across[0] + at - 0.7, across[1] + 6.8], label));
-    // Right of the ticks there are 4 mm; the longest label is wider and stands below the ruler.
+    // Right of the ticks there are 4 mm; the longest label is wider and is placed below the ruler.
     let beside = labels.iter().map(|(at, label)| {
         let (dx, dy) = if *at == 100.0 { (0.0, 3.5) } else { (4.4, 0.9) };
         text([down[0] + dx, down[1] + at + dy], label)

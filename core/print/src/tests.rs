@@ -30,7 +30,7 @@ fn all() -> Vec<TargetSpec> {
     ]
 }
 
-/// What a PDF without compression says: the operators of its page, and its box.
+/// Contents of a PDF without compression: the operators of its page, and its box.
 struct Read {
     media_box: [f64; 4],
     matrix: [f64; 6],

@@ -13,13 +13,13 @@ use crate::background::run;
 use crate::error::Failure;
 use crate::input::Observations;
 
-/// What the result contract has no place for: the disagreement of pose pairs per axis, metres and radians.
+/// Not part of the result contract: the disagreement of pose pairs per axis, metres and radians.
 type PairSigmas = Option<(f64, f64)>;
 
 /// RMS distance \[m\] between reported poses and those of the arm, where these are not its poses: it is then not corrected.
 type OtherChain = Option<f64>;
 
-/// The result document as JSON, the disagreement of pose pairs, and whether the controller counts with another arm.
+/// The result document as JSON, the disagreement of pose pairs, and whether the controller uses another arm.
 #[pyfunction]
 #[pyo3(signature = (observations, method, keep_outliers, free_scale, goal_mm, progress))]
 pub fn calibrate(
@@ -49,7 +49,7 @@ pub fn calibrate(
     Ok((result.to_json().map_err(|error| Failure::NoAnswer(error.to_string()))?, sigmas, other_chain))
 }
 
-/// What is wrong with the data: JSON, the page of text, and whether nothing is.
+/// Diagnosis of the data: JSON, the page of text, and whether no problem was found.
 #[pyfunction]
 pub fn diagnose(
     py: Python<'_>,
@@ -64,7 +64,7 @@ pub fn diagnose(
         let diagnosis = match calibrate_with(observed, Method::Joint, Options::default(), &wanted, work) {
             Ok(calibration) => calibration.into_diagnosis(),
             Err(CalibrateError::HandEye(HandEyeError::Cancelled)) => return Err(HandEyeError::Cancelled.into()),
-            // Why there is no calibration is what the diagnosis is about.
+            // The diagnosis explains why there is no calibration.
             Err(_) => doctor::diagnose(observed, &wanted, work.cancel),
         };
         if work.is_cancelled() {

@@ -47,8 +47,8 @@ impl ArmDescription {
     }
 }
 
-/// Puts the arm where the views say that it stands, and its joints into the views. Joint values that do not belong to the poses, and
-/// poses that do not tell where the arm stands, are no failure yet: a diagnosis goes on without the arm.
+/// Places the arm where the views show it, and adds its joints to the views. Joint values that do not belong to the poses, and
+/// poses that do not determine where the arm is, are not an error yet: a diagnosis goes on without the arm.
 pub fn placed(
     description: ArmDescription,
     joints: &[u8],

@@ -1,4 +1,4 @@
-//! Work on a thread of its own while Python goes on: its other threads run, Ctrl-C ends the work, progress is told.
+//! Work on a separate thread while Python goes on: its other threads run, Ctrl-C ends the work, progress is reported.
 
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
@@ -10,19 +10,19 @@ use pyo3::prelude::*;
 
 use crate::error::Failure;
 
-/// How often signals are looked at: soon enough for a person who pressed Ctrl-C.
+/// Interval at which signals are checked: short enough for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// What the working thread says.
+/// Messages of the working thread.
 enum WorkerMessage<T> {
     Progress(Progress),
     Done(Result<T, Failure>),
 }
 
-/// Does the work without holding Python's lock. `told` is called with the stage in words and the part of it that is done.
+/// Does the work without holding Python's lock. `told` is called with the stage as text and the part of it that is done.
 ///
 /// # Errors
-/// That of the work; `KeyboardInterrupt`, or what `told` raised, after which the work was cancelled.
+/// The error of the work; `KeyboardInterrupt`, or the exception of `told`, after which the work was cancelled.
 pub fn run<T: Send>(
     py: Python<'_>,
     stated: Option<&Bound<'_, PyAny>>,
@@ -34,7 +34,7 @@ pub fn run<T: Send>(
         let (sender, mut receiver) = channel();
         let token = cancel.clone();
         let worker = scope.spawn(move || {
-            // Nobody listens any more only when nobody waits any more.
+            // The receiver is only gone when no one waits for the result any more.
             let say = |reported| drop(sender.send(reported));
             let progress = |now: Progress| {
                 if wants_progress {

@@ -18,7 +18,7 @@ fn stream<Dst: Frame, Src: Frame>(what: &str, stamps_s: &[u8], matrices: &[u8]) 
     Ok(stamps.into_iter().zip(poses(what, matrices, &names)?).collect())
 }
 
-/// What is added to stamps of the camera to have them by the robot's clock, and its standard deviation, seconds.
+/// Offset to add to timestamps of the camera to convert them to the robot's clock, and its standard deviation, seconds.
 #[pyfunction]
 #[pyo3(name = "clock_offset")]
 pub fn of_streams(
@@ -41,7 +41,7 @@ pub fn of_streams(
     })
 }
 
-/// The robot's poses at other times, and whether each lies within its stream; the identity where it does not.
+/// The robot's poses at other times, and whether each is within its stream; the identity where it does not.
 #[pyfunction]
 pub fn poses_at<'py>(
     py: Python<'py>,

@@ -27,21 +27,21 @@ pub struct CorrectedArm {
 
 #[pymethods]
 impl CorrectedArm {
-    /// Of the JSON of `arm` in a result.
+    /// From the JSON of `arm` in a result.
     #[new]
     fn new(arm: &str) -> Result<Self, Failure> {
         let arm: ArmEstimate = serde_json::from_str(arm).map_err(Failure::input)?;
         Ok(Self { corrected: arm.corrected_arm().map_err(Failure::input)? })
     }
 
-    /// How many joints it has.
+    /// Number of joints.
     #[getter]
     fn joint_count(&self) -> usize {
         self.corrected.arm.joint_count()
     }
 
-    /// What to command for each wanted pose, near the joint values of its row; near those of the row before where there is none.
-    /// `names` are what messages call the rows.
+    /// Commands for each wanted pose, near the joint values of its row; near those of the previous row where there are none.
+    /// `names` are the names of the rows in messages.
     fn commands<'py>(
         &self,
         py: Python<'py>,
@@ -59,7 +59,7 @@ impl CorrectedArm {
         ))
     }
 
-    /// Where the tip really is for each row of joint values, and how far from there at the most.
+    /// True tip pose for each row of joint values, and its 95 % error.
     fn actual<'py>(
         &self,
         py: Python<'py>,

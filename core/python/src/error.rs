@@ -14,7 +14,7 @@ mod python {
 /// Why a call has no answer.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
-    /// What was given cannot be used as it is.
+    /// The given input cannot be used.
     #[error("{0}")]
     Input(String),
     /// It can be used, and has no answer.
@@ -26,7 +26,7 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// What was given is at fault.
+    /// An error of the given input.
     pub fn input(error: impl ToString) -> Self {
         Self::Input(error.to_string())
     }

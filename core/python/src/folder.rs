@@ -18,7 +18,7 @@ type CornerBytes<'py> = (Bound<'py, PyBytes>, Bound<'py, PyBytes>);
 /// A dataset folder that was read.
 pub struct Folder {
     dataset: Dataset,
-    /// What `sha256sum` prints of its text files, which may change until there is a result.
+    /// Output of `sha256sum` for its text files, which may change until there is a result.
     listing: String,
 }
 

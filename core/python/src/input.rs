@@ -1,4 +1,4 @@
-//! What was observed, out of arrays.
+//! Observations from arrays.
 
 use std::collections::BTreeSet;
 
@@ -21,13 +21,13 @@ use crate::error::Failure;
 use crate::folder::Folder;
 use crate::numbers::{bytes_of, doubles, integers, poses};
 
-/// How far beside the image a corner may be, pixels, as in a corner table.
+/// How far outside of the image a corner may be, pixels, as in a corner table.
 const BORDER_PX: f64 = 1.0;
-/// Stands for the target of pose pairs where none is stated: 0.1 m of board about the origin of its frame. It is what
-/// effects are judged at, and enters no estimate.
+/// Replaces the target of pose pairs where none is stated: 0.1 m of board about the origin of its frame. Effects are
+/// evaluated on it, and it enters no estimate.
 const NO_TARGET: TargetSpec = TargetSpec::Circles(Grid { columns: 3, rows: 3, square_m: 0.05 });
 
-/// What is small, from Python.
+/// Small inputs from Python.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Description {
@@ -84,7 +84,7 @@ fn model(name: &str) -> Result<Distortion, Failure> {
         .ok_or_else(|| Failure::Input(format!("{name:?} is no lens model: none, brown_conrady, rational or fisheye")))
 }
 
-/// What a calibration is made from.
+/// Input of a calibration.
 #[pyclass(frozen, module = "handeye._handeye")]
 pub struct Observations {
     pub observed: Observed,
@@ -94,7 +94,7 @@ pub struct Observations {
     pub target_is_known: bool,
     /// The arm, where its joints in the views are known; why they are not used otherwise.
     pub arm: Option<Result<ArmOfViews, PlacementError>>,
-    /// How accurate the robot is, where something was said of it.
+    /// Accuracy of the robot, where it is stated.
     pub robot_accuracy: Option<RobotAccuracy>,
 }
 
@@ -107,7 +107,7 @@ impl Observations {
         self.arm.as_ref()?.as_ref().ok()
     }
 
-    /// What is wanted of their calibration.
+    /// Requirements for their calibration.
     pub fn wanted(&self, goal_mm: Option<f64>) -> FindingOptions<'_> {
         FindingOptions::with_goal_mm(goal_mm).with_arm(self.arm()).with_robot_accuracy(self.robot_accuracy)
     }

@@ -1,4 +1,4 @@
-//! What the Python module `handeye` is computed by.
+//! Computations of the Python module `handeye`.
 //!
 //! Python sources in `python/handeye` give it names, shapes and docstrings; here numbers become observations, and answers
 //! become the documents that the command line writes. Arrays cross as bytes of doubles in the order of C, small things as

@@ -10,7 +10,7 @@ use crate::error::Failure;
 
 /// Numbers of a 4 × 4 matrix.
 pub const OF_MATRIX: usize = 16;
-/// How far the last row of a transform may be from 0 0 0 1.
+/// Largest deviation of the last row of a transform from 0 0 0 1.
 const LAST_ROW: f64 = 1e-9;
 
 /// The doubles of an array.
@@ -56,7 +56,7 @@ pub fn poses<Dst: Frame, Src: Frame>(
     matrices.iter().zip(names).map(one).collect()
 }
 
-/// The transform of a matrix; words where it is none.
+/// The transform of a matrix; an error text where it is not one.
 pub fn isometry(m: &[f64; OF_MATRIX]) -> Result<Isometry3<f64>, String> {
     if !m.iter().all(|v| v.is_finite()) {
         return Err("a number is not finite: leave this view out, or correct its pose".to_owned());

@@ -105,7 +105,7 @@ struct Crossings {
     slope: f64,
     line: f64,
     last: f64,
-    /// Where on the way, 0 to 1, the next line is; infinite when there is none left.
+    /// Position of the next line on the way, 0 to 1; infinite when there is none left.
     tau: f64,
 }
 
@@ -133,7 +133,7 @@ impl Crossings {
     }
 }
 
-/// Rounds down; unlike the method of that name it is no library call on processors without SSE 4.1.
+/// Rounds down; unlike the method of that name it is not a library call on processors without SSE 4.1.
 pub(super) fn floor(x: f64) -> f64 {
     let cut = x as i64 as f64;
     if cut > x { cut - 1.0 } else { cut }

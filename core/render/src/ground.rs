@@ -9,7 +9,7 @@ use super::shade::{Lamp, SurfaceShade, misty};
 use super::shapes::{Facet, Vec3, dot, scale_add};
 use super::texture::{WoodAt, tiles};
 
-/// Shadows are soft, so they are computed for one pixel in so many and interpolated.
+/// Shadows are soft, so they are computed for one pixel in this many and interpolated.
 const SHADOW_STEP: usize = 4;
 
 /// A flat piece with a pattern under a lamp that is everywhere the same.
@@ -53,8 +53,8 @@ impl Ground {
         })
     }
 
-    /// Depths and colours of `count` neighbouring pixels that all hit this piece. `sunlit` tells the part of the lamp
-    /// that reaches a point; `None` when nothing stands in the light.
+    /// Depths and colours of `count` neighbouring pixels that all hit this piece. `sunlit` gives the part of the lamp
+    /// that reaches a point; `None` when nothing blocks the light.
     pub fn paint(
         &self,
         count: usize,

@@ -1,4 +1,4 @@
-//! What a sensor does to the ideal image: blur, noise, rounding.
+//! Effects of a sensor on the ideal image: blur, noise, rounding.
 
 use std::sync::LazyLock;
 

@@ -83,7 +83,7 @@ pub struct BoardSurface {
     pub white: f32,
     /// Colour of the back of the sheet.
     pub back: [f32; 3],
-    /// How the corners of the print are off the grid; `None` for an exact print.
+    /// Displacements of the print's corners from the grid; `None` for an exact print.
     pub print: Option<Arc<PrintErrors>>,
 }
 
@@ -214,23 +214,23 @@ impl Default for Light {
     }
 }
 
-/// What of a scene a pixel of the colour image is made of.
+/// Sampling of the scene by a pixel of the colour image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sampling {
     /// The mean over its area, as a pixel of a camera.
     #[default]
     Area,
-    /// What its centre sees, as in a frame buffer with one sample a pixel: edges are hard steps. CoppeliaSim's vision
-    /// sensors have it on every graphics card.
+    /// The scene at its centre, as in a frame buffer with one sample a pixel: edges are hard steps. CoppeliaSim's
+    /// vision sensors have it on every graphics card.
     Centre,
 }
 
-/// What the sensor adds to the ideal image. A value that is not above zero, or not a number, switches its effect off.
+/// Effects of the sensor on the ideal image. A value that is not above zero, or not a number, switches its effect off.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Imaging {
-    /// What a pixel of the colour image is made of.
+    /// Sampling of a pixel of the colour image.
     pub sampling: Sampling,
     /// Standard deviation of a Gaussian blur in pixels, on top of the box of a pixel.
     pub blur_px: f64,
@@ -245,7 +245,7 @@ pub struct Imaging {
     /// Depth that is added, in parts of what depth changes by from a pixel to the next along the row or the column,
     /// whichever is more: the polygon offset of OpenGL, half a pixel's in CoppeliaSim.
     pub depth_offset_px: f64,
-    /// What is said of the depth where nothing is hit; the far plane if absent.
+    /// Reported depth where nothing is hit; the far plane if absent.
     pub depth_of_nothing_m: Option<f64>,
 }
 

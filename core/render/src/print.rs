@@ -1,8 +1,8 @@
-//! A print whose corners are off the grid.
+//! A print with displaced corners.
 
-/// How the nodes of a chessboard are off the grid they stand for: the inner corners, and around them those on the
-/// outline of the print. Between nodes the print is stretched bilinearly, so that the sides of squares are straight
-/// from corner to corner.
+/// Displacements of the nodes of a chessboard from the grid: the inner corners, and around them those on the outline of
+/// the print. Between nodes the print is stretched bilinearly, so that the sides of squares are straight from corner to
+/// corner.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PrintErrors {
     columns: usize,
@@ -12,7 +12,7 @@ pub struct PrintErrors {
 }
 
 impl PrintErrors {
-    /// The displacement of each node in squares, along the columns and along the rows. `at` is asked for the nodes
+    /// The displacement of each node in squares, along the columns and along the rows. `at` is called for the nodes
     /// (−1, −1) to (`columns`, `rows`); the first inner corner is (0, 0).
     pub fn new(columns: usize, rows: usize, at: impl Fn(i64, i64) -> [f64; 2]) -> Self {
         let nodes = (-1..=rows as i64).flat_map(|row| (-1..=columns as i64).map(move |column| (column, row)));

@@ -62,7 +62,7 @@ pub(super) struct RayTable {
 
 #[derive(Debug, Clone)]
 enum Source {
-    /// Without distortion it is faster to compute a ray than to fetch it.
+    /// Without distortion it is faster to compute a ray than to load it.
     Pinhole { centre: [f64; 2], per_pixel: [f64; 2] },
     /// Row by row from the top.
     Table(Vec<Ray>),

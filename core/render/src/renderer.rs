@@ -22,10 +22,10 @@ pub struct Renderer {
     table: RayTable,
 }
 
-/// What the rays through the pixel centres found.
+/// Hits of the rays through the pixel centres.
 struct Traced {
     depths_m: Vec<f32>,
-    /// Face per pixel, and colours three per pixel; empty when only depth was asked for.
+    /// Face per pixel, and colours three per pixel; empty when only depth was requested.
     faces: Vec<u16>,
     colours: Vec<f32>,
 }
@@ -62,7 +62,7 @@ impl Renderer {
         self.trace(scene, &Imaging::default(), true).colours
     }
 
-    /// As [`Self::render_rgb`], with the depths of a sensor without noise, which cost nothing more; see [`Self::sense_depth`].
+    /// As [`Self::render_rgb`], with the depths of a sensor without noise, at no extra cost; see [`Self::sense_depth`].
     pub fn render_rgb_with_ideal_depth(
         &self,
         scene: &RenderScene,
@@ -74,7 +74,7 @@ impl Renderer {
         (self.finish_rgb(traced, imaging, seed), depths_m)
     }
 
-    /// What the sensor makes of depths without noise: the same, bit for bit, as [`Self::render_depth`] of their scene.
+    /// The sensor's depths from those without noise: the same, bit for bit, as [`Self::render_depth`] of their scene.
     pub fn sense_depth(&self, ideal_m: Vec<f32>, imaging: &Imaging, seed: u64) -> Vec<f32> {
         self.finish_depth(ideal_m, imaging, seed)
     }

@@ -77,7 +77,7 @@ pub(super) struct SurfaceShade {
     fade: Option<[f64; 2]>,
 }
 
-/// What is known about the pixel that is being coloured.
+/// Known data of the pixel that is being coloured.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Spot {
     /// Direction of its ray, `(x, y, 1)`.

@@ -1,7 +1,7 @@
-//! Soft shadows on floors and tables, from simple stand-ins of the bodies.
+//! Soft shadows on floors and tables, from simple replacements of the bodies.
 //!
-//! They are there for the eye, which reads from them what stands where. The print of the board gets none, so that
-//! no edge appears on it that is not printed.
+//! They are only for the viewer, who sees from them where objects are. The print of the board gets none, so that no
+//! edge appears on it that is not printed.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -15,11 +15,11 @@ const CONTACT_M: f64 = 0.004;
 /// A shadow thinner than this part of the light is left out.
 const BARELY: f64 = 1e-3;
 
-/// Something that stands in the light, in camera coordinates.
+/// An object in the light, in camera coordinates.
 #[derive(Debug, Clone)]
 pub(super) struct ShadowCaster {
     form: Form,
-    /// The solid that it stands for; it casts no shadow on itself. `None` for the board.
+    /// The solid that it represents; it casts no shadow on itself. `None` for the board.
     pub owner: Option<usize>,
 }
 
@@ -32,7 +32,7 @@ enum Form {
 }
 
 impl ShadowCaster {
-    /// The stand-in of a solid; `None` for what casts no shadow.
+    /// The shadow caster of a solid; `None` if it casts no shadow.
     pub fn of_solid(owner: usize, solid: &Solid, camera_from_shape: &Isometry3<f64>) -> Option<Self> {
         let form = match solid.shape {
             Shape::Sphere { radius } => rod(camera_from_shape, &Point3::origin(), &Point3::origin(), radius),
@@ -130,11 +130,11 @@ fn plate(camera_from_shape: &Isometry3<f64>, middle: &Point3<f64>, sides: [usize
 
 struct Approach {
     distance: f64,
-    /// How far along the light.
+    /// Distance along the light.
     way: f64,
 }
 
-/// Where the way from a point to the lamp comes closest to a segment.
+/// Closest approach of the way from a point to the lamp to a segment.
 fn approach(point: &Vec3, towards: &Vec3, from: &Vec3, along: &Vec3) -> Approach {
     let offset = scale_add(-1.0, from, point);
     let squared = dot(along, along);

@@ -81,7 +81,7 @@ impl Rays {
     }
 }
 
-/// What a tile can expect of a surface.
+/// The surface as seen by a tile.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reach {
     /// No hit is nearer.
@@ -273,7 +273,7 @@ impl Surface {
         }
     }
 
-    /// What the tile with these rays can expect; `None` when none of them hits.
+    /// The surface as seen by the tile with these rays; `None` when none of them hits.
     pub fn reach(&self, rays: &Rays) -> Option<Reach> {
         match self {
             Self::Facet(facet) => facet.reach(rays),

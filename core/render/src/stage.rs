@@ -15,7 +15,7 @@ use super::{BoardSurface, Imaging, PrintErrors, RenderScene, Sampling};
 /// Face number of the background.
 pub(super) const BACKGROUND: u16 = 0;
 
-/// The sheet wins against what it lies on up to this relative difference in depth, half a micrometre at half a metre.
+/// The sheet is in front of its support up to this relative difference in depth, half a micrometre at half a metre.
 const SHEET_LEAD: f64 = 1.0 - 1e-6;
 
 /// One surface with its look.
@@ -54,7 +54,7 @@ struct Print {
     white: f32,
 }
 
-/// Where a ray ends.
+/// End of a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Hit {
     pub depth: f64,
@@ -68,12 +68,12 @@ struct Candidate {
     nearest: f64,
 }
 
-/// What a tile has to do with.
+/// Contents of a tile.
 #[derive(Debug, Default)]
 pub(super) struct TileContent {
     /// From near to far.
     candidates: Vec<Candidate>,
-    /// What may throw a shadow there, as indices.
+    /// Indices of casters that may throw a shadow there.
     casters: Vec<u16>,
     /// The first candidate hides all else and no ray misses it.
     is_covered: bool,
@@ -144,7 +144,7 @@ impl Stage {
         }
     }
 
-    /// What the rays of a tile may hit, without what is hidden behind a face that covers the whole tile.
+    /// Surfaces that the rays of a tile may hit, without those hidden behind a face that covers the whole tile.
     pub fn survey(&self, rays: &Rays, with_shadows: bool) -> TileContent {
         let mut candidates = Vec::new();
         let mut hidden_beyond = self.far_m;
@@ -233,7 +233,7 @@ impl Stage {
         };
         let piece = &self.pieces[first.piece as usize];
         let (true, Surface::Facet(facet)) = (sight.is_covered, &piece.surface) else { return None };
-        // Every ray hits the facet, so that its outline need not be looked at.
+        // Every ray hits the facet, so that its outline need not be checked.
         let depth_along = |ray: &Ray| {
             let depth = 1.0 / dot(facet.inverse_depth(), &ray.direction());
             depth + self.offset_of_depth(facet.inverse_depth(), depth, ray)
@@ -260,7 +260,7 @@ impl Stage {
         Some(piece.face)
     }
 
-    /// What a sensor without noise says of the depth of a hit.
+    /// Depth of a hit as reported by a sensor without noise.
     pub fn sensed_depth(&self, hit: &Hit, ray: &Ray) -> f64 {
         let Some(index) = hit.piece.filter(|_| self.depth_offset_px > 0.0) else { return hit.depth };
         let surface = &self.pieces[index as usize].surface;
@@ -311,7 +311,7 @@ impl Stage {
 }
 
 impl Piece {
-    /// Whether it is flat and all of it that a tile may see lies behind the plane of another flat piece.
+    /// Whether it is flat and its part that a tile may see is behind the plane of another flat piece.
     fn is_behind(&self, cover: &Self, rays: &Rays) -> bool {
         let (Surface::Facet(back), Surface::Facet(front)) = (&self.surface, &cover.surface) else { return false };
         // Depths compete after they were multiplied by the lead.
@@ -373,8 +373,8 @@ impl Print {
         [light * (self.white + dark * (self.dark - self.white)); 3]
     }
 
-    /// What a pixel covers around a point of the print. That the print is off the grid moves it: its sides change by
-    /// less than a hundredth.
+    /// Footprint of a pixel around a point of the print. Displacements of the print shift it: its sides change by less
+    /// than a hundredth.
     fn footprint(&self, ray: &Ray, depth: f64, [s, r]: [f64; 2], centre: [f64; 2]) -> Footprint {
         let [x_by_u, x_by_v, y_by_u, y_by_v] = ray.by_pixel.map(f64::from);
         let slopes = |form: &Vec3, value: f64| {

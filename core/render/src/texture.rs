@@ -146,7 +146,7 @@ impl Map {
     }
 }
 
-/// Index into `size` texels that run forth and back for ever.
+/// Index into `size` texels that run forth and back without end.
 fn mirrored(i: i64, size: usize) -> usize {
     let i = i as usize & (2 * size - 1);
     if i < size { i } else { 2 * size - 1 - i }

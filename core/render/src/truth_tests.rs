@@ -202,7 +202,7 @@ fn an_upright_camera_sees_the_boards_x_axis_to_the_right_and_its_y_axis_down() {
     assert!(a < 60.0 && b < 60.0 && c > 120.0, "{a} {b} {c}");
 }
 
-/// Where a node of a print that is up to a tenth of a millimetre off was printed.
+/// Printed position of a node of a print with errors of up to a tenth of a millimetre.
 fn printed(column: i64, row: i64) -> Point3<f64> {
     let [along, down] = off(column, row);
     corner(column as f64 + along, row as f64 + down)

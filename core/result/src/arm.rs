@@ -11,62 +11,65 @@ use handeye_estimate::corrected_arm::CorrectedArm;
 use handeye_estimate::handeye::joint::{ArmErrors, LinkError, PoseDependentError, SmallSample, arm_parameters};
 use handeye_estimate::reach_error::USUAL_TOOL_M;
 
-/// The errors of the robot's arm as the images show them, and the transforms that go with corrected poses.
+/// The errors of the robot's arm as the images show them, and the transforms for corrected poses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ArmEstimate {
-    /// The arm as its controller takes it to be, where it stands and with the tip at its end: metres and radians.
+    /// The arm as its controller models it, at its place and with the tip at its end: metres and radians.
     pub chain: Arm,
-    /// Where the tip of the tool is in the frame of the tip for which the reach errors of `quality` are, metres.
+    /// Position of the tool's tip, in the frame of the tip, for the reach errors of `quality`, metres.
     #[serde(default = "usual_tool")]
     pub tool_m: [f64; 3],
-    /// What is off about each joint, from the base to the tip.
+    /// Errors of each joint, from the base to the tip.
     pub joints: Vec<JointErrorEstimate>,
-    /// How large errors of their kind are in this arm.
+    /// Typical size of errors of each kind in this arm.
     pub levels: ArmLevels,
-    /// What of the robot's error they do not explain, one standard deviation per axis.
+    /// The part of the robot's error that they do not explain, one standard deviation per axis.
     pub unexplained: Unexplained,
     /// The camera on its mount, to be used with corrected poses alone.
     pub hand_eye: TransformEstimate,
-    /// The target, likewise.
+    /// The target, estimated with the arm as well.
     pub target: TransformEstimate,
-    /// The camera that goes with `hand_eye`: estimated with the arm it is another one than by reported poses. Results before this was
-    /// written have none.
+    /// The intrinsics that belong to `hand_eye`: estimated with the arm it differs from that by reported poses. Older results do
+    /// not have it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub intrinsics: Option<IntrinsicsEstimate>,
-    /// The target's shape that goes with them, where it was estimated.
+    /// The target's shape that belongs to them, where it was estimated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub board: Option<BoardEstimate>,
-    /// Errors that depend on where the tip stands and that joints and links do not explain, where the data show them: `E` of the reported
-    /// pose, behind the pose of the tip by the chain with its errors. Corrected poses are with it.
+    /// Errors that depend on where the tip is and that joints and links do not explain, where the data show them: `E` of the
+    /// reported pose, behind the pose of the tip by the chain with its errors. Corrected poses include it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field: Option<PoseDependentErrorEstimate>,
     /// Covariance of the errors, radians and metres: for the joints in their order all `tilt` (x, y) and `zero`, then all `shift`
-    /// (x, y), then all `compliance`; what is null in `joints` is left out. Where there is a `field`, then its slopes by columns: all of
+    /// (x, y), then all `compliance`; what is null in `joints` is left out. Where there is a `field`, then its slopes by columns:
+    /// all of
     /// the position (tip, base), then all of the orientation.
     pub covariance: Vec<Vec<f64>>,
-    /// By how much the covariances were widened, as in [`EstimateDetails`](super::EstimateDetails); `None` where they were not.
+    /// Factor by which the covariances were widened, as in [`EstimateDetails`](super::EstimateDetails); `None` where they were
+    /// not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub widening: Option<OverdispersionRecord>,
     /// As in [`EstimateDetails`](super::EstimateDetails).
     pub degrees_of_freedom: Option<f64>,
-    /// Likewise.
+    /// As in [`EstimateDetails`](super::EstimateDetails).
     pub region_scale: f64,
     /// RMS of 2-D corner residuals on views left out, pixels; `None` with too few of them.
     pub heldout_px: Option<HeldOutByArm>,
-    /// Whether views left out contradict the errors, being predicted worse by corrected poses than chance and the model explain: then
+    /// Whether held-out views contradict the errors, as corrected poses predict them worse than chance and the model explain: then
     /// do not correct.
     pub contradicted: bool,
 }
 
-/// Results that say nothing of a tool were made with this one.
+/// Results without a tool were made with this one.
 fn usual_tool() -> [f64; 3] {
     [0.0, 0.0, USUAL_TOOL_M]
 }
 
-/// What is off about one joint, each with its standard deviation. What no view can tell from the two transforms is `None`.
+/// Errors of one joint, each with its standard deviation. Those that no view can separate from the two transforms are
+/// `None`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct JointErrorEstimate {
-    /// What it is called.
+    /// Name of the joint.
     pub name: String,
     /// Direction of its axis, rotation about x and y of its frame, degrees.
     pub tilt_deg: Option<[f64; 2]>,
@@ -80,7 +83,7 @@ pub struct JointErrorEstimate {
     pub shift_mm: Option<[f64; 2]>,
     /// Standard deviations.
     pub shift_sigma_mm: Option<[f64; 2]>,
-    /// What it gives way by where gravity turns it with all the weight behind it, degrees.
+    /// Deflection under gravity with all the weight behind the joint, degrees.
     pub compliance_deg: Option<f64>,
     /// Standard deviation.
     pub compliance_sigma_deg: Option<f64>,
@@ -89,20 +92,20 @@ pub struct JointErrorEstimate {
 /// Standard deviations of the errors of this arm by their kind.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ArmLevels {
-    /// Of tilts and zeros, degrees.
+    /// Tilts and zeros, degrees.
     pub angle_deg: f64,
-    /// Of shifts, millimetres.
+    /// Shifts, millimetres.
     pub length_mm: f64,
-    /// Of compliances, degrees.
+    /// Compliances, degrees.
     pub compliance_deg: f64,
 }
 
 /// Noise of corrected tip poses.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Unexplained {
-    /// Of the position, millimetres.
+    /// Position, millimetres.
     pub translation_mm: f64,
-    /// Of the orientation, degrees.
+    /// Orientation, degrees.
     pub rotation_deg: f64,
 }
 
@@ -115,7 +118,7 @@ pub struct HeldOutByArm {
     pub corrected: f64,
 }
 
-/// Where value and standard deviation of an error have their place.
+/// The fields of the value and the standard deviation of an error.
 fn slot(joint: &mut JointErrorEstimate, error: LinkError) -> (&mut f64, &mut f64) {
     let JointErrorEstimate { tilt_deg, tilt_sigma_deg, shift_mm, shift_sigma_mm, .. } = joint;
     let (values, sigmas, axis) = match error {
@@ -160,7 +163,7 @@ fn of_document(errors: &ArmErrors, covariance: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 impl ArmEstimate {
-    /// Of a fit of the errors of an arm; `None` where that is an arm with another number of joints.
+    /// The record of a fit of an arm's errors; `None` where the arm has another number of joints.
     pub fn new(chain: &Arm, fit: &ArmFit, tool_m: [f64; 3]) -> Option<Self> {
         if chain.joint_count() != fit.errors.joint_count() {
             return None;
@@ -210,7 +213,7 @@ impl ArmEstimate {
     /// The arm that is corrected by it.
     ///
     /// # Errors
-    /// [`BadResult`] names the value that does not belong to an arm of so many joints.
+    /// [`BadResult`] names the value that does not fit the number of joints.
     pub fn corrected_arm(&self) -> Result<CorrectedArm, BadResult> {
         self.check()?;
         let parameters = arm_parameters(self.chain.joint_count());

@@ -1,4 +1,4 @@
-//! What the types of a result do not say: finite, unit length, the frames of the mode.
+//! What the types of a result do not ensure: finite, unit length, the frames of the mode.
 
 use super::{
     BoardEstimate, CalibrationResult, EstimateDetails, FORMAT, IntrinsicsEstimate, MethodStatus, PrintEstimate,
@@ -7,8 +7,8 @@ use super::{
 use handeye_estimate::handeye::Mode;
 use handeye_geometry::camera::residual_distortion::{MOST_DEGREES, functions};
 
-/// How far from 1 the length of a quaternion may be: far above rounding, far below the nine digits that other
-/// programs print.
+/// Largest deviation of a quaternion's length from 1: far above rounding, far below the nine digits that other programs
+/// print.
 const UNIT_TOLERANCE: f64 = 1e-6;
 /// Largest relative asymmetry of a covariance: rounding of a product of matrices.
 const SYMMETRY_TOLERANCE: f64 = 1e-6;
@@ -18,7 +18,7 @@ const SYMMETRY_TOLERANCE: f64 = 1e-6;
 #[error("{at} {problem}")]
 #[non_exhaustive]
 pub struct BadResult {
-    /// Which value, as a path of keys.
+    /// The value, as a path of keys.
     pub at: String,
     /// What is wrong with it.
     pub problem: &'static str,
@@ -45,7 +45,7 @@ fn unit_quaternion(xyzw: &[f64; 4], at: &str) -> Checked {
 }
 
 impl CalibrationResult {
-    /// Checks what the types do not say.
+    /// Checks what the types do not ensure.
     ///
     /// # Errors
     /// [`BadResult`] names the first value that must not be.

@@ -1,4 +1,5 @@
-//! What a joint estimate says beyond the answer: how sure it is and why, the target as it found it, the robot's joints.
+//! Details of a joint estimate beyond the answer: its uncertainty and the reasons, the estimated target, the robot's
+//! joints.
 
 use nalgebra::{Matrix3, Vector2};
 use serde::{Deserialize, Serialize};
@@ -12,14 +13,14 @@ use handeye_estimate::uncertainty::overdispersion::Overdispersion;
 /// standard deviations of its intrinsics.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct EstimateDetails {
-    /// Expected error by the noise alone, 95 %, millimetres: as if the model were true whatever the findings say.
+    /// Expected error by the noise alone, 95 %, millimetres: as if the model were true whatever the findings are.
     #[serde(default)]
     pub modelled_error_95_mm: Option<f64>,
-    /// How far what was found and is not in the model would move a point where the target was seen, millimetres; it is
-    /// part of `quality.tip_error_95_mm`. `None` when nothing of the kind was found.
+    /// Displacement, by the detected effects that are not in the model, of a point where the target was seen,
+    /// millimetres; it is part of `quality.tip_error_95_mm`. `None` when no such effect was found.
     #[serde(default)]
     pub moved_mm: Option<f64>,
-    /// Where the expected error is stated: camera coordinates, metres.
+    /// Point at which the expected error is stated: camera coordinates, metres.
     pub reference_point_m: Option<[f64; 3]>,
     /// Degrees of freedom that the stated error of a point rests on, because the noise levels are estimated; `None` when they
     /// were given, and the errors are Gaussian.
@@ -27,25 +28,25 @@ pub struct EstimateDetails {
     /// The squared distance `eᵀ C⁻¹ e` of the hand-eye's error times this has the 95 % quantile of
     /// `6 F(6, degrees_of_freedom)`.
     pub region_scale: Option<f64>,
-    /// Noise that all corners of a view share, pixels; zero where the data ask for none.
+    /// Noise that all corners of a view share, pixels; zero where the data do not need it.
     pub view_sigma_px: Option<f64>,
-    /// By how much the covariances were widened, because the data scatter more than the noise levels say.
+    /// Factor by which the covariances were widened, because the data scatter more than the noise levels explain.
     pub widening: Option<OverdispersionRecord>,
     /// The target where it was found not to be the one drawn.
     pub board: Option<BoardEstimate>,
     /// The size of the target by the robot's motion, which the answer does not count on unless `board` has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target_size: Option<TargetSizeEstimate>,
-    /// Errors of the robot that depend on where it stands, where the data show them.
+    /// Errors of the robot that depend on where it is, where the data show them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robot_field: Option<PoseDependentErrorEstimate>,
-    /// What the points of the target are off their drawing, where the data show it.
+    /// Displacements of the target's points from their drawing, where the data show them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub print: Option<PrintEstimate>,
     /// The depths of the captures in the estimate, where enough were measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depths: Option<DepthsEstimate>,
-    /// What the lens does beyond its model, where the data show it.
+    /// The distortion that the lens model does not cover, where the data show it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub residual_distortion: Option<ResidualDistortionEstimate>,
 }
@@ -53,11 +54,11 @@ pub struct EstimateDetails {
 /// A widened covariance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OverdispersionRecord {
-    /// By how much standard deviations were widened, at least 1.
+    /// Factor by which standard deviations were widened, at least 1.
     pub factor: f64,
-    /// Which evidence asked for it, or which was looked at in vain.
+    /// The evidence for it, or the evidence that was checked without result.
     pub by: String,
-    /// By how much standard deviations of an estimated lens were widened besides, above 1, as far as the views disagree about it.
+    /// Additional factor for the standard deviations of an estimated lens, above 1, as far as the views disagree about it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lens_factor: Option<f64>,
 }
@@ -87,7 +88,7 @@ pub struct TargetSizeEstimate {
     pub true_over_stated: f64,
     /// Its standard deviation.
     pub sigma: f64,
-    /// Whether a size that is off by 3 %, as prints and rulers are, would be found.
+    /// Whether a size error of 3 %, as prints and rulers have, would be detected.
     pub determined: bool,
 }
 
@@ -104,10 +105,10 @@ pub struct BoardEstimate {
     pub scale_sigma: Option<f64>,
 }
 
-/// Where the points of the target are: printed off their places in the drawing, within its plane.
+/// The points of the target as printed: displaced from their places in the drawing, within its plane.
 ///
 /// Point `k` in the order of the target's points is at `(x, y) + (x_mm[k], y_mm[k])` where it is drawn at `(x, y)`, along the
-/// axes of the target. A shift or a turn of all points together is none of it.
+/// axes of the target. A shift or a rotation of all points together is not part of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PrintEstimate {
     /// RMS of all errors per axis, millimetres.
@@ -127,14 +128,14 @@ impl PrintEstimate {
     }
 }
 
-/// What was tried with the depths of the captures: the errors of the depth camera are in the result's `depth`.
+/// The use of the captures' depths: the errors of the depth camera are in the result's `depth`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DepthsEstimate {
     /// Captures with depths of the target.
     pub captures: usize,
     /// Noise of depths that all those of a capture have in common, one standard deviation, millimetres.
     pub noise_mm: f64,
-    /// Whether the answer leaves it open how far the depth camera is turned against the lens, and does not take it for straight.
+    /// Whether the rotation of the depth camera relative to the lens is estimated, instead of assumed to be zero.
     pub turned: bool,
     /// Probability that it is the other way.
     pub other_probability: f64,
@@ -149,36 +150,37 @@ pub struct DepthsEstimate {
 /// Errors of the robot as an affine function of where its tip is: an optional correction of reported poses.
 ///
 /// With `p` the reported tip position in the base, the true tip pose is `base_from_tip * E`: `E` has the translation
-/// `position_slopes (p - origin_m)` in metres and the rotation vector `orientation_slopes_rad_per_m (p - origin_m)` in radians, both in
-/// the axes of the tip; those in the axes of the base, with the reported rotation `R`, add `Rᵀ position_slopes_in_base (p - origin_m)`
-/// and likewise. Where `p` is farther from the origin than `reach_m` nothing is known, and `p - origin_m` is shortened to that length.
+/// `position_slopes (p - origin_m)` in metres and the rotation vector `orientation_slopes_rad_per_m (p - origin_m)` in radians,
+/// both in the axes of the tip; those in the axes of the base, with the reported rotation `R`, add `Rᵀ position_slopes_in_base (p -
+/// origin_m)`, and accordingly for the rotation. Where `p` is farther from the origin than `reach_m` nothing is known, and `p -
+/// origin_m` is shortened to that length.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PoseDependentErrorEstimate {
-    /// Where the field is zero, in the base, metres: the middle of the session's tip positions.
+    /// Point at which the field is zero, in the base, metres: the middle of the session's tip positions.
     pub origin_m: [f64; 3],
-    /// How far from there the session went, metres.
+    /// Largest distance from there in the session, metres.
     pub reach_m: f64,
     /// Metres of error in the axes of the tip per metre, by rows.
     pub position_slopes: [[f64; 3]; 3],
     /// Radians of error in the axes of the tip per metre, by rows.
     pub orientation_slopes_rad_per_m: [[f64; 3]; 3],
-    /// Metres of error in the axes of the base per metre, by rows; beside the errors of an arm alone.
+    /// Metres of error in the axes of the base per metre, by rows; only with the errors of an arm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub position_slopes_in_base: Option<[[f64; 3]; 3]>,
-    /// Radians of error in the axes of the base per metre, likewise.
+    /// Radians of error in the axes of the base per metre, by rows; only with the errors of an arm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orientation_slopes_in_base_rad_per_m: Option<[[f64; 3]; 3]>,
     /// Estimated standard deviation of the error of position per axis, at the RMS distance of the session's tip positions
     /// from the origin, millimetres.
     pub typical_mm: f64,
-    /// Of the error of orientation likewise, degrees.
+    /// The same for the error of orientation, degrees.
     pub typical_deg: f64,
     /// Error on held-out views with the correction applied, pixels; `quality.heldout_rms_px` is without it.
     pub heldout_rms_px: Option<f64>,
 }
 
 impl PoseDependentErrorEstimate {
-    /// Of a field at these noise levels.
+    /// The record of a field at these noise levels.
     pub(super) fn new(field: &PoseDependentError, noise: &Noise, heldout_rms_px: Option<f64>) -> Self {
         let rows = |m: &Matrix3<f64>| [0, 1, 2].map(|i| [m[(i, 0)], m[(i, 1)], m[(i, 2)]]);
         let (in_tip, in_base) = (field.in_tip(), field.in_base());
@@ -219,12 +221,12 @@ impl PoseDependentErrorEstimate {
     }
 }
 
-/// What the lens does beyond its model, as an optional correction of image points.
+/// The distortion that the lens model does not cover, as an optional correction of image points.
 ///
-/// A point that is measured at pixel `(u, v)` lies at `(u, v) - f(u, v)` by the lens model. Along x
-/// `f = sum of x_px[k] P_i(a) P_j(b)`, along y likewise, over all `i + j` up to `degree`, in rising `i + j` and then rising `i`;
-/// `a = (u + 1/2) / (width / 2) - 1` and `b = (v + 1/2) / (height / 2) - 1`, kept from -1 to 1, and `P_n` is `sqrt(2 n + 1)` times
-/// Legendre's polynomial.
+/// A point that is measured at pixel `(u, v)` lies at `(u, v) - f(u, v)` by the lens model. Along x `f = sum of x_px[k] P_i(a)
+/// P_j(b)`, along y with `y_px[k]`, over all `i + j` up to `degree`, in rising `i + j` and then rising `i`; `a = (u + 1/2) /
+/// (width / 2) - 1` and `b = (v + 1/2) / (height / 2) - 1`, kept from -1 to 1, and `P_n` is `sqrt(2 n + 1)` times Legendre's
+/// polynomial.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ResidualDistortionEstimate {
     /// Highest total degree of the polynomials.
@@ -237,5 +239,5 @@ pub struct ResidualDistortionEstimate {
     pub rms_px: f64,
 }
 
-/// Findings as they stand in the document.
+/// The findings of the document.
 pub type Findings = Vec<FindingRecord>;

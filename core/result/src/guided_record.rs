@@ -8,7 +8,7 @@ pub const GUIDED_RECORD: &str = "guided.json";
 /// A guided session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GuidedRecord {
-    /// The 95 % error that was asked for, millimetres.
+    /// The requested 95 % error, millimetres.
     pub goal_mm: f64,
     /// The box in camera coordinates that the goal holds for, millimetres: smallest and largest coordinates. `None` for where the
     /// camera saw the board.
@@ -33,14 +33,14 @@ pub struct StepRecord {
     pub joints: Option<Vec<f64>>,
     /// Why this pose.
     pub why: String,
-    /// The error before it, 95 %, millimetres: of a measured point by the noise alone, or of a tool by corrected commands; `None` for
-    /// the first turns.
+    /// The error before it, 95 %, millimetres: of a measured point by the noise alone, or of a tool by corrected commands; `None`
+    /// for the first turns.
     pub before_mm: Option<f64>,
     /// The error that it was to lead to.
     pub promised_mm: Option<f64>,
     /// The error that it led to; `None` where there was no answer yet, and where it was not captured.
     pub achieved_mm: Option<f64>,
-    /// How long the arm was to be on its way, seconds.
+    /// Planned travel time of the arm, seconds.
     pub travel_s: f64,
     /// Views that were compared.
     pub candidates: usize,
@@ -62,7 +62,7 @@ impl GuidedRecord {
     /// Writes it as JSON, as a whole or not at all.
     ///
     /// # Errors
-    /// That of the file.
+    /// The error of writing the file.
     pub fn write(&self, path: &std::path::Path) -> std::io::Result<()> {
         handeye_files::atomic_file::write(path, handeye_files::json_text::pretty(self)?.as_bytes())
     }

@@ -1,8 +1,8 @@
 //! The result of a calibration as a document: what `calibrate` and `auto` write and the exporters read.
 //!
 //! The layout is `assets/schema/handeye-calibration-1.schema.json`. A number that is not known is `null`, never 0.
-//! Lengths are metres, angles radians and quaternions x, y, z, w unless a key says otherwise; covariances are those of
-//! `[tx ty tz rx ry rz]` in `T * exp(delta)`.
+//! Lengths are metres, angles radians and quaternions x, y, z, w unless a key states otherwise; covariances are those
+//! of `[tx ty tz rx ry rz]` in `T * exp(delta)`.
 //!
 //! ```
 //! use handeye_result::CalibrationResult;
@@ -47,9 +47,9 @@ pub use estimate::{
 pub use file::{ResultError, ResultProblem};
 pub use of_calibration::{TARGET_OPTION, solve_options};
 
-/// What `format` says.
+/// Value of `format`.
 pub const FORMAT: &str = "handeye-calibration";
-/// What `version` says: the layout that is written and read here.
+/// Value of `version`: the layout that is written and read here.
 pub const VERSION: u32 = 1;
 
 /// The document.
@@ -59,7 +59,7 @@ pub struct CalibrationResult {
     pub format: String,
     /// [`VERSION`].
     pub version: u32,
-    /// Where the camera sits; `None` when only intrinsics were estimated.
+    /// Where the camera is mounted; `None` when only intrinsics were estimated.
     pub mode: Option<Mode>,
     /// The camera on its mount: tip to camera in eye-in-hand, base to camera in eye-to-hand.
     pub hand_eye: Option<TransformEstimate>,
@@ -69,14 +69,14 @@ pub struct CalibrationResult {
     pub intrinsics: Option<IntrinsicsEstimate>,
     /// How good it is.
     pub quality: Quality,
-    /// What the closed-form solvers say, for comparison.
+    /// Results of the closed-form solvers, for comparison.
     pub methods: Vec<MethodRecord>,
-    /// What became of every view.
+    /// Status of every view.
     pub views: Vec<ViewRecord>,
     /// Details of an estimate; `None` for a closed form, and for a camera that was given.
     #[serde(default)]
     pub estimate: Option<EstimateDetails>,
-    /// The errors of the robot's arm and the transforms that go with corrected poses; `None` where its joints are not known.
+    /// The errors of the robot's arm and the transforms for corrected poses; `None` where its joints are not known.
     #[serde(default)]
     pub arm: Option<ArmEstimate>,
     /// What is weak or wrong, the most severe first.
@@ -85,15 +85,15 @@ pub struct CalibrationResult {
     /// Errors on captures that never entered the fit; `None` when there are none.
     #[serde(default)]
     pub verification: Option<VerificationSummary>,
-    /// What the depths of the captures say of a depth camera; `None` where the captures have none.
+    /// Errors of the depth camera by the depths of the captures; `None` where the captures have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth: Option<DepthSummary>,
-    /// How its poses were chosen, where guided capture chose them.
+    /// How guided capture chose its poses, where it did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub guided: Option<GuidedRecord>,
     /// Comparison with the truth, where a simulated cell publishes it.
     pub truth: Option<TruthComparison>,
-    /// What made this result.
+    /// How this result was made.
     pub provenance: Provenance,
 }
 
@@ -144,7 +144,7 @@ impl TransformEstimate {
         }
     }
 
-    /// The pose in the frames that the caller states; `None` when the names say otherwise.
+    /// The pose in the frames that the caller states; `None` when the names differ from these.
     pub fn pose<Parent: Frame, Child: Frame>(&self) -> Option<Pose<Parent, Child>> {
         let fits = self.parent_frame == Parent::NAME && self.child_frame == Child::NAME;
         fits.then(|| Pose::from_translation_xyzw(self.translation_m, self.rotation_xyzw))
@@ -185,13 +185,13 @@ pub struct IntrinsicsEstimate {
 /// Standard deviations of the pinhole parameters in pixels.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct IntrinsicsSigma {
-    /// Of `fx`.
+    /// Standard deviation of `fx`.
     pub fx: Option<f64>,
-    /// Of `fy`.
+    /// Standard deviation of `fy`.
     pub fy: Option<f64>,
-    /// Of `cx`.
+    /// Standard deviation of `cx`.
     pub cx: Option<f64>,
-    /// Of `cy`.
+    /// Standard deviation of `cy`.
     pub cy: Option<f64>,
 }
 
@@ -228,7 +228,7 @@ impl IntrinsicsEstimate {
     }
 }
 
-/// How good a calibration is. A residual says how well the model fits, not how accurate it is.
+/// How good a calibration is. A residual shows how well the model fits, not how accurate it is.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
     /// Root mean square reprojection error over the corners used, pixels.
@@ -240,17 +240,18 @@ pub struct Quality {
     /// Expected error where the tool works: 95 % of the errors are below, millimetres.
     pub tip_error_95_mm: Option<f64>,
     /// Distance between a point that the camera saw and the tip of a tool that is sent there by the controller as it is: 95 % are
-    /// below, millimetres; `None` where neither the errors of the arm are known nor the accuracy of the robot, where the arm does not get
-    /// there, and where no error may be stated.
+    /// below, millimetres; `None` where neither the errors of the arm are known nor the accuracy of the robot, where the arm does
+    /// not get there, and where no error may be stated.
     #[serde(default)]
     pub reach_error_95_mm: Option<f64>,
-    /// The same by corrected poses and commands; `None`, too, where the controller counts with another chain.
+    /// The same by corrected poses and commands; `None`, too, where the controller uses another chain.
     #[serde(default)]
     pub reach_error_corrected_95_mm: Option<f64>,
-    /// How accurate the robot was said to be, where the reach error follows from that and not from the errors of its arm, millimetres.
+    /// Stated accuracy of the robot, where the reach error follows from that and not from the errors of its arm, millimetres.
     #[serde(default)]
     pub robot_accuracy_mm: Option<f64>,
-    /// The tip of the tool that the reach error is of then, in the frame of the tip, metres; that of the errors of an arm is with these.
+    /// The tip of the tool that the reach error is of then, in the frame of the tip, metres; that of the errors of an arm is with
+    /// these.
     #[serde(default)]
     pub robot_tool_m: Option<[f64; 3]>,
     /// Estimated noise of the robot's positions, millimetres per axis.
@@ -267,7 +268,7 @@ impl Quality {
     }
 }
 
-/// What one closed-form solver says.
+/// Result of one closed-form solver.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MethodRecord {
     /// Name of the method, `snake_case`.
@@ -276,7 +277,7 @@ pub struct MethodRecord {
     pub translation_m: Option<[f64; 3]>,
     /// Unit quaternion x, y, z, w; `None` when the method failed.
     pub rotation_xyzw: Option<[f64; 4]>,
-    /// How it went.
+    /// Its status.
     pub status: MethodStatus,
 }
 
@@ -291,20 +292,20 @@ impl MethodRecord {
         }
     }
 
-    /// A method that found none.
+    /// A method without a solution.
     pub(crate) fn failed(name: &str, error: &dyn fmt::Display) -> Self {
         let status = MethodStatus::Failed(error.to_string());
         Self { name: name.to_owned(), translation_m: None, rotation_xyzw: None, status }
     }
 }
 
-/// `ok`, or why there is no answer.
+/// `ok`, or why there is no solution.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(from = "String", into = "String")]
 pub enum MethodStatus {
     /// There is an answer.
     Ok,
-    /// Why there is none.
+    /// Why there is no solution.
     Failed(String),
 }
 
@@ -323,18 +324,18 @@ impl From<MethodStatus> for String {
     }
 }
 
-/// What became of one view.
+/// Record of one view.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ViewRecord {
     /// Its name in the data set.
     pub name: String,
-    /// What became of it.
+    /// Its status.
     pub status: ViewRecordStatus,
     /// Root mean square reprojection error of its corners, pixels.
     pub rms_px: Option<f64>,
     /// How far the hand-eye translation moves without this view, millimetres.
     pub influence_mm: Option<f64>,
-    /// How far it is from what the other views expect, over the limit from which it is left out as an outlier.
+    /// Its distance from the prediction of the other views, divided by the outlier limit.
     #[serde(default)]
     pub distance: Option<f64>,
     /// Corners of it that were left out as outliers, by their index.
@@ -345,7 +346,7 @@ pub struct ViewRecord {
     pub renumbered: bool,
 }
 
-/// What became of a view.
+/// Status of a view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ViewRecordStatus {
@@ -387,11 +388,11 @@ pub struct DepthSummary {
     pub fill: f64,
     /// Measured over expected depth, median.
     pub ratio: f64,
-    /// How far they are off; `None` for a single capture, and for depths of another unit or another image.
+    /// Errors of the depths; `None` for a single capture, and for depths of another unit or another image.
     pub errors: Option<DepthErrorsSummary>,
 }
 
-/// How far depths are off; standard deviations are of one.
+/// Errors of depths; standard deviations are of one depth.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DepthErrorsSummary {
     /// Measured minus expected depth at a distance of [`Self::at_mm`], millimetres.
@@ -400,15 +401,16 @@ pub struct DepthErrorsSummary {
     pub offset_sigma_mm: f64,
     /// Mean distance of the target, millimetres.
     pub at_mm: f64,
-    /// How much faster than the distance the depth grows; `None` for less than six captures.
+    /// Relative scale error of the depth; `None` for less than six captures.
     pub scale: Option<f64>,
     /// Its standard deviation.
     pub scale_sigma: Option<f64>,
-    /// What is added to the depth of a slanted surface, in pixels' worth of its slope; `None` for less than six captures.
+    /// Offset of the depth of a slanted surface, as the change of depth over this many pixels; `None` for less than six
+    /// captures.
     pub slope_px: Option<f64>,
     /// Its standard deviation.
     pub slope_sigma_px: Option<f64>,
-    /// How far the target is turned by depth, about the camera's x and y, degrees.
+    /// Rotation of the target by its depths, about the camera's x and y, degrees.
     pub tilt_deg: [f64; 2],
     /// Standard deviations of both.
     pub tilt_sigma_deg: [f64; 2],
@@ -449,7 +451,7 @@ pub struct TruthComparison {
     pub focal_error_percent: Option<f64>,
 }
 
-/// What made a result, so that it can be made again.
+/// How a result was made, so that it can be reproduced.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Provenance {
     /// Version of the program.

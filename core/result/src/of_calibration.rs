@@ -16,10 +16,10 @@ use handeye_estimate::{
 };
 use handeye_geometry::targets::TargetSpec;
 
-/// Where a result says which board it was made with, among the options that it depends on.
+/// Key of the board that a result was made with, among the options that it depends on.
 pub const TARGET_OPTION: &str = "target";
 
-/// What a result depends on besides its data.
+/// What a result depends on in addition to its data.
 pub fn solve_options(method: Method, options: Options, target: &TargetSpec) -> BTreeMap<String, serde_json::Value> {
     let target = serde_json::to_value(target).unwrap_or_default();
     BTreeMap::from([
@@ -31,7 +31,7 @@ pub fn solve_options(method: Method, options: Options, target: &TargetSpec) -> B
 }
 
 impl CalibrationResult {
-    /// A calibration as a document. `options` are what the answer depends on besides the input.
+    /// A calibration as a document. `options` are what the answer depends on in addition to the input.
     pub fn of(
         calibration: &Calibration,
         tool_version: &str,
@@ -78,10 +78,11 @@ impl CalibrationResult {
         result
     }
 
-    /// States what a calibration found of the errors of an arm; nothing where it found none. `of_views` is the arm in its views.
+    /// Records the arm errors that a calibration found; nothing where it found none. `of_views` is the arm in its views.
     ///
-    /// False where the reported poses are not those of the arm's chain, see [`handeye_estimate::placement::Placement::arm_of_poses`]: errors that are found beside
-    /// them are none of the chain, and no command is corrected by them.
+    /// False where the reported poses are not those of the arm's chain, see
+    /// [`handeye_estimate::placement::Placement::arm_of_poses`]: errors found with them are not errors of the chain, and do not
+    /// correct any command.
     #[must_use]
     pub fn state_arm(&mut self, calibration: &Calibration, of_views: &ArmOfViews) -> bool {
         let Some(errors) = calibration.joint.as_ref().and_then(|joint| joint.arm.as_ref()) else { return true };

@@ -139,7 +139,7 @@ pub fn golden() -> CalibrationResult {
     result
 }
 
-/// The same with the camera beside the robot.
+/// The same with the camera next to the robot (eye to hand).
 pub fn eye_to_hand() -> CalibrationResult {
     let mut result = golden();
     let links = HandEye::EyeToHand {
@@ -194,7 +194,7 @@ pub fn golden_arm() -> (Arm, ArmFit) {
     (chain, fit)
 }
 
-/// The same with errors that depend on where the tip stands as well, per 0.25 m.
+/// The same with additional errors that depend on where the tip is, per 0.25 m.
 pub fn golden_arm_with_a_field() -> (Arm, ArmFit) {
     let (chain, fit) = golden_arm();
     let slopes = |s: f64| Slopes {

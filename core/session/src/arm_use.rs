@@ -1,4 +1,4 @@
-//! What the arm of a session tells about its captures.
+//! What the arm of a session shows about its captures.
 
 use std::collections::BTreeMap;
 
@@ -11,12 +11,12 @@ use handeye_dataset::write::Joints;
 use handeye_estimate::placement::{self, JointView, Placement, PlacementError};
 
 impl Document {
-    /// The arm where the captures in use put it, as they do in the session's data set. `None` when the session names no arm, or one of
-    /// the captures in use has no joint angles: the others alone would mislead.
+    /// The arm where the captures in use put it, as they do in the session's data set. `None` when the session names no arm, or
+    /// one of the captures in use has no joint angles: the others alone would mislead.
     ///
     /// # Errors
     /// [`PlacementError`] when the joint angles are of no use: they do not fit the poses with this arm, or the captures do
-    /// not determine where it stands.
+    /// not determine where the arm is.
     pub(crate) fn placement(&self) -> Result<Option<Placement>, PlacementError> {
         let in_use: Option<Vec<JointView<'_>>> = self.in_use().map(joint_view).collect();
         let (Some(model), Some(in_use)) = (&self.meta.arm, in_use) else { return Ok(None) };
@@ -24,8 +24,8 @@ impl Document {
         Ok(Some(placement))
     }
 
-    /// Where the joints are at the tip in the captures, see [`handeye_arm::Arm::tip_from_joints`]. A capture that is excluded or kept
-    /// for verification is there when its joint angles belong to its pose.
+    /// Poses of the joints relative to the tip in the captures, see [`handeye_arm::Arm::tip_from_joints`]. A capture that is
+    /// excluded or kept for verification is included when its joint angles belong to its pose.
     pub(crate) fn tip_from_joints(&self, placement: &Placement) -> BTreeMap<CaptureId, Vec<Isometry3<f64>>> {
         let frames = |capture| placement.tip_from_joints(&joint_view(capture)?).ok();
         self.captures.iter().filter_map(|capture| Some((capture.id, frames(capture)?))).collect()

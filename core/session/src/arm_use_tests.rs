@@ -29,7 +29,7 @@ fn store(folder: &std::path::Path, arm: Option<ArmModel>) -> Store {
     store
 }
 
-/// Where the joints are at the tip in the captures that know it.
+/// Poses of the joints relative to the tip in the captures that have them.
 fn joints_of(document: &Document) -> BTreeMap<CaptureId, Vec<Isometry3<f64>>> {
     let placement = document.placement().expect("they belong together").expect("an arm");
     document.tip_from_joints(&placement)
@@ -68,7 +68,7 @@ fn a_session_without_an_arm_is_the_data_set_that_it_was_before_there_were_any() 
     assert!(!json.contains("\"arm\""));
 }
 
-/// A Panda's, and those of an arm on a track: a metre is no angle, and is not converted.
+/// Joints of a Panda, and of an arm on a track: a metre is not an angle, and is not converted.
 #[test]
 fn joints_of_an_arm_that_is_not_known_are_kept_in_session_and_data_set_whatever_their_number_and_kind() {
     let kinds = [vec![JointKind::Revolute; 7], vec![JointKind::Prismatic, JointKind::Revolute]];

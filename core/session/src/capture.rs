@@ -1,4 +1,4 @@
-//! What is captured, and its files.
+//! Captures and their files.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -21,7 +21,7 @@ use handeye_wording::text;
 /// The folder of depth images in a session.
 pub(super) const DEPTH: &str = "depth";
 
-/// What one capture consists of.
+/// The data of one capture.
 #[derive(Debug, Clone, Copy)]
 pub struct Capture<'a> {
     /// The colour image.
@@ -36,11 +36,11 @@ pub struct Capture<'a> {
     pub sim_time_s: Option<f64>,
     /// Whether it is for the calibration or for verification.
     pub role: Role,
-    /// How many frames the image is the mean of, at least 1.
+    /// Number of frames that the image is the mean of, at least 1.
     pub frames: u32,
     /// Noise of a corner of this image along one axis, pixels (one sigma), where it was measured.
     pub corner_noise_px: Option<f64>,
-    /// How long the arm had stood when the image was taken, seconds.
+    /// How long the arm had been at rest when the image was taken, seconds.
     pub settled_s: Option<f64>,
     /// The taught pose at which it was taken.
     pub pose_name: Option<&'a str>,

@@ -11,7 +11,7 @@ use handeye_wording::one_line;
 
 pub(super) const NAMES: [&str; 3] = [dataset::DESCRIPTION, dataset::write::POSE_TABLE, DOCUMENT];
 
-/// What is known to be in the files.
+/// Known contents of the files.
 #[derive(Debug, Default)]
 pub(super) struct Derived {
     written: [Option<String>; 3],

@@ -1,4 +1,4 @@
-//! What a session says: plain data, without files and without history.
+//! The contents of a session: plain data, without files and without history.
 
 use std::collections::BTreeMap;
 use std::path::{Component, Path};
@@ -25,7 +25,7 @@ use handeye_wording::text;
 /// The state of a session. It changes by [`super::Edit`] alone, see [`Document::apply`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Document {
-    /// What was known when it began, and what was changed since.
+    /// What was known when it began, with later changes.
     #[serde(flatten)]
     pub meta: SessionMeta,
     /// The captures in the order in which they were taken; a deleted one is not among them.
@@ -45,11 +45,11 @@ pub struct SessionMeta {
     pub created: String,
     /// Version of the program.
     pub tool_version: String,
-    /// Where the camera sits.
+    /// Where the camera is mounted.
     pub mode: Mode,
-    /// What is looked at.
+    /// The target.
     pub target: TargetSpec,
-    /// What is known of the camera beforehand.
+    /// Prior knowledge of the camera.
     pub camera: Option<CameraInput>,
     /// Seeds by what they are for, so that a simulated session can be made again.
     pub seeds: BTreeMap<String, u64>,
@@ -58,19 +58,19 @@ pub struct SessionMeta {
     /// The arm, where it is known: what the joint angles of the captures belong to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub arm: Option<ArmModel>,
-    /// Where the tip of the tool is in the frame of the tip, metres; without it a usual one is counted with.
+    /// Position of the tool's tip in the frame of the tip, metres; without it a usual one is assumed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tool_m: Option<[f64; 3]>,
-    /// How accurate the robot is, millimetres, see [`RobotAccuracy`](handeye_estimate::robot_accuracy::RobotAccuracy).
+    /// Accuracy of the robot, millimetres, see [`RobotAccuracy`](handeye_estimate::robot_accuracy::RobotAccuracy).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robot_accuracy_mm: Option<f64>,
-    /// How the joints of an arm that is not known move, from the base up. Without it they are taken for six that turn, as
-    /// they were in sessions that were written before there were others.
+    /// Kinds of the joints of an unknown arm, from the base up. Without it six revolute joints are assumed, as in
+    /// sessions that were written before there were others.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint_kinds: Option<Vec<JointKind>>,
 }
 
-/// What a simulated cell knows.
+/// Ground truth of a simulated cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GroundTruth {
     /// The camera on its mount.
@@ -97,7 +97,7 @@ impl GroundTruth {
     }
 }
 
-/// What a capture is for.
+/// Purpose of a capture.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
@@ -111,7 +111,7 @@ pub enum Role {
 /// One capture as it is recorded.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CaptureRecord {
-    /// Which one.
+    /// Id of the capture.
     // Sessions of version 1.0 have none; their reader fills it in, see `session_file`.
     #[serde(default = "CaptureId::none")]
     pub id: CaptureId,
@@ -119,7 +119,8 @@ pub struct CaptureRecord {
     pub image: String,
     /// The depth image, relative to the session.
     pub depth: Option<String>,
-    /// Tip pose as the controller reported it; `None` where there is no robot. All captures of a session have one, or none has.
+    /// Tip pose as the controller reported it; `None` where there is no robot. Either all captures of a session have one, or
+    /// none.
     #[serde(default, with = "pose_record::optional", skip_serializing_if = "Option::is_none")]
     pub base_from_tip: Option<Pose<Base, Tip>>,
     /// Joint angles as the controller reported them, radians.
@@ -129,16 +130,16 @@ pub struct CaptureRecord {
     /// Whether it is for the calibration or for verification.
     #[serde(default)]
     pub role: Role,
-    /// Whether a person took it out.
+    /// Whether the user excluded it.
     #[serde(default)]
     pub excluded: bool,
-    /// How many frames the image is the mean of.
+    /// Number of frames that the image is the mean of.
     #[serde(default = "one")]
     pub frames: u32,
     /// Noise of a corner of this image along one axis, pixels (one sigma), where it was measured.
     #[serde(default)]
     pub corner_noise_px: Option<f64>,
-    /// How long the arm had stood when the image was taken, seconds.
+    /// How long the arm had been at rest when the image was taken, seconds.
     #[serde(default)]
     pub settled_s: Option<f64>,
     /// The taught pose at which it was taken.
@@ -151,7 +152,7 @@ fn one() -> u32 {
 }
 
 impl CaptureRecord {
-    /// A capture of which no more is known than its image and, where there is a robot, where the tip was.
+    /// A capture with only its image and, where there is a robot, where the tip was.
     pub fn new(id: CaptureId, image: String, base_from_tip: impl Into<Option<Pose<Base, Tip>>>) -> Self {
         Self {
             id,
@@ -186,7 +187,7 @@ impl Document {
         self.captures.iter().filter(|capture| capture.is_in_use())
     }
 
-    /// Where the camera sits; `None` where there is no robot, and the camera by itself is calibrated.
+    /// Where the camera is mounted; `None` where there is no robot, and the camera by itself is calibrated.
     pub fn mode(&self) -> Option<Mode> {
         let has_robot = self.captures.first().is_none_or(|capture| capture.base_from_tip.is_some());
         has_robot.then_some(self.meta.mode)
@@ -203,7 +204,7 @@ impl Document {
         }
     }
 
-    /// Checks everything that the types do not say.
+    /// Checks everything that the types do not ensure.
     ///
     /// # Errors
     /// [`EditError`] names the first value that a session must not have.
@@ -225,7 +226,7 @@ impl Document {
 }
 
 impl SessionMeta {
-    /// Checks what the types do not say.
+    /// Checks what the types do not ensure.
     pub(super) fn check(&self) -> Result<(), EditError> {
         self.target.check().map_err(|why| bad("target", text!("cannot be: {why}", why = why)))?;
         if let Some(Err(why)) = self.arm.as_ref().map(ArmModel::arm) {
@@ -258,12 +259,12 @@ impl SessionMeta {
 }
 
 impl CaptureRecord {
-    /// It as an image with its robot pose, for an export; `None` where there is no robot.
+    /// The capture as an image with its robot pose, for an export; `None` where there is no robot.
     pub fn export_view(&self) -> Option<ExportView> {
         Some(ExportView { name: self.image.clone(), base_from_tip: self.base_from_tip? })
     }
 
-    /// Whether a calibration is fitted to it.
+    /// Whether it is used in the fit of a calibration.
     pub fn is_in_use(&self) -> bool {
         !self.excluded && self.role == Role::Calibration
     }
@@ -303,7 +304,7 @@ impl CaptureRecord {
     }
 }
 
-/// What a file of taught poses asks for as well, so that the poses of every cell can be written to one.
+/// Requirements of a file of taught poses, so that the poses of every cell can be written to one.
 pub(super) fn check_taught(poses: &[TaughtPose]) -> Result<(), EditError> {
     for (i, pose) in poses.iter().enumerate() {
         let before = || poses[..i].iter().filter(|other| other.is_of(pose.cell.as_ref()));

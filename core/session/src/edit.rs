@@ -1,4 +1,4 @@
-//! What a person does to a session, as data: recorded in the journal, undone and redone as a whole.
+//! Changes of a session by the user, as data: recorded in the journal, undone and redone as a whole.
 
 use std::fmt;
 
@@ -31,7 +31,7 @@ pub enum Edit {
     SetRole {
         /// The captures that are changed.
         ids: Vec<CaptureId>,
-        /// What they are for.
+        /// Their new role.
         role: Role,
     },
     /// Another target.
@@ -40,11 +40,11 @@ pub enum Edit {
     SetMode(Mode),
     /// Something else is known of the camera beforehand.
     SetCamera(Option<CameraInput>),
-    /// The robot is known to be so accurate, millimetres; `None` where that is not known.
+    /// Accuracy of the robot, millimetres; `None` where that is not known.
     SetRobotAccuracy(Option<f64>),
     /// Other taught poses.
     SetTaught {
-        /// What was done to them.
+        /// The kind of change.
         change: TaughtChange,
         /// All of them afterwards.
         poses: Vec<TaughtPose>,

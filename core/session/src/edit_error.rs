@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::capture_id::CaptureId;
 use handeye_wording::Text;
 
-/// What was done to the taught poses.
+/// The kind of change of the taught poses.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TaughtChange {
@@ -32,7 +32,7 @@ pub enum TaughtChange {
 #[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum EditError {
-    /// There is no such capture, or no longer.
+    /// There is no such capture, or it was removed.
     #[error("capture {0} is not in this session: choose one of the captures in the list")]
     UnknownCapture(CaptureId),
     /// The change names no capture at all.
@@ -47,22 +47,22 @@ pub enum EditError {
     /// Two taught poses of one name.
     #[error("two taught poses have the name {0:?}: names tell poses apart, so give one of them another")]
     SamePoseName(String),
-    /// What is stated to be done to the taught poses is not what the poses say.
+    /// The stated change of the taught poses does not match the poses.
     #[error("the taught poses do not show what was done to them ({0}): send all poses as they are afterwards")]
     TaughtChange(TaughtChange),
     /// A value that a session must not have.
     #[error("{at}: {what}", at = &**at, what = &**what)]
     Bad {
         // Boxed, as most functions of a session hand this error on.
-        /// Which value.
+        /// The value.
         at: Box<Text>,
-        /// What is wrong with it.
+        /// The error.
         what: Box<Text>,
     },
     /// The document already is as the change would make it; an undo step would show nothing.
     #[error("nothing changes: the session is like this already")]
     NoChange,
-    /// There is no change before this one, or none that is still remembered.
+    /// There is no change before this one, or it is no longer recorded.
     #[error("there is nothing to undo")]
     NothingToUndo,
     /// The last thing done was not an undo.
@@ -71,7 +71,7 @@ pub enum EditError {
 }
 
 impl EditError {
-    /// That a value is none of a session.
+    /// The error for a value that is not valid in a session.
     pub(super) fn bad(at: Text, what: Text) -> Self {
         Self::Bad { at: Box::new(at), what: Box::new(what) }
     }

@@ -1,17 +1,17 @@
-//! What can go wrong with a session folder.
+//! Errors of a session folder.
 
 use std::path::{Path, PathBuf};
 
 use super::edit_error::EditError;
 
-/// What is wrong, and with which file or folder.
+/// An error, with its file or folder.
 #[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[error("{file}: {problem}", file = file.display())]
 #[non_exhaustive]
 pub struct SessionError {
     /// The file or folder.
     pub file: PathBuf,
-    /// What is wrong.
+    /// The error.
     pub problem: SessionProblem,
 }
 
@@ -34,7 +34,7 @@ impl SessionError {
     }
 }
 
-/// What is wrong with a session.
+/// The error of a session.
 #[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum SessionProblem {
@@ -59,7 +59,7 @@ pub enum SessionProblem {
     /// A layout that is not known here.
     #[error("has version {found:?}, this program reads version {known}: use a newer handeye")]
     Version {
-        /// What it says.
+        /// The value found.
         found: String,
         /// The major version that is read.
         known: u32,
@@ -75,7 +75,7 @@ pub enum SessionProblem {
     Damaged {
         /// Line of the journal as an editor counts it, from 1.
         row: u64,
-        /// What is wrong with it.
+        /// The error.
         what: String,
     },
     /// An entry of the journal is whole and not known here.
@@ -83,7 +83,7 @@ pub enum SessionProblem {
     Unknown {
         /// Line of the journal as an editor counts it, from 1.
         row: u64,
-        /// What is not known.
+        /// The unknown name.
         what: String,
     },
     /// `session.json` was written by a program that knows no journal, after the journal was there.

@@ -1,4 +1,4 @@
-//! Sessions that somebody else made, with links in them.
+//! Sessions of another user, with links in them.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -11,7 +11,7 @@ use handeye_result::CalibrationResult;
 
 const PRECIOUS: &str = "years of work";
 
-/// A session with two captures beside a file and a folder of the user.
+/// A session with two captures, next to a file and a folder of the user.
 struct Home(tempfile::TempDir);
 
 impl Home {
@@ -67,7 +67,7 @@ fn links_in_the_place_of_files_are_replaced_and_what_they_lead_to_stays() {
         symlink(home.precious(), hidden).expect("a link");
         drop(fs::remove_file(&path));
         if name == "session.json" {
-            // What it leads to must not be a document of something else, which is not replaced either.
+            // Not a link to a foreign document: such a link is not replaced either.
             symlink(home.0.path().join("not-there"), &path).expect("a link");
         } else {
             symlink(home.precious(), &path).expect("a link");

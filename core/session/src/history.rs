@@ -8,7 +8,7 @@ use super::document::{CaptureRecord, Document};
 use super::edit::Edit;
 use super::edit_error::EditError;
 
-/// How many changes can be undone. More than a person counts back, and with a hundred captures a few megabytes.
+/// Number of changes that can be undone. More than a user needs, and a few megabytes with a hundred captures.
 ///
 /// It may be raised and never lowered: a journal may hold as many undos in a row.
 pub const UNDO_STEPS: usize = 200;
@@ -64,8 +64,7 @@ impl History {
     /// Changes the document; what was undone before can no longer be redone.
     ///
     /// # Errors
-    /// As [`Document::apply`]; [`EditError::UsedNumber`] also for the number of a capture that is gone. Nothing
-    /// changes then.
+    /// As [`Document::apply`]; [`EditError::UsedNumber`] also for the id of a removed capture. Nothing changes then.
     pub fn apply(&mut self, edit: Edit) -> Result<(), EditError> {
         if let Edit::AddCapture(record) = &edit
             && record.id <= self.last_capture
@@ -107,12 +106,12 @@ impl History {
         Ok(())
     }
 
-    /// What [`Self::undo`] would take back.
+    /// The change that [`Self::undo`] would undo.
     pub fn undo_edit(&self) -> Option<&Edit> {
         self.past.back().map(|step| &*step.edit)
     }
 
-    /// What [`Self::redo`] would make again.
+    /// The change that [`Self::redo`] would redo.
     pub fn redo_edit(&self) -> Option<&Edit> {
         self.future.last().map(|step| &*step.edit)
     }

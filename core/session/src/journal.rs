@@ -26,7 +26,7 @@ use handeye_files::atomic_file;
 use handeye_files::own_folder::{self, JOURNAL};
 use handeye_wording::one_line;
 
-/// What `format` says in the first entry.
+/// Value of `format` in the first entry.
 const FORMAT: &str = "handeye-journal";
 /// The layout: a reader refuses another one.
 const MAJOR_VERSION: u32 = 1;
@@ -61,7 +61,7 @@ struct Line<E> {
     entry: E,
 }
 
-/// What the first line says before it is known whether the rest can be understood.
+/// The first line, read before it is known whether the rest can be parsed.
 #[derive(Deserialize)]
 struct FirstEntry {
     begin: Header,
@@ -81,7 +81,7 @@ enum BadLine {
     Unknown(String),
 }
 
-/// What a journal says.
+/// Contents of a journal.
 #[derive(Debug)]
 pub(super) struct Replayed {
     pub history: History,
@@ -110,7 +110,7 @@ fn encode(seq: u64, entry: &Entry) -> Result<(String, Entry), SessionProblem> {
     let body = serde_json::to_string(&Line { seq, entry }).map_err(json)?;
     let body = body.strip_suffix('}').unwrap_or(&body);
     let line = format!("{body},\"sha256\":\"{}\"}}\n", checksum(body.as_bytes()));
-    // What cannot be read again is not written.
+    // An entry that cannot be read back is not written.
     let Line { entry: read, .. } = serde_json::from_str::<Line<Entry>>(&line).map_err(json)?;
     if read == *entry {
         Ok((line, read))
@@ -143,7 +143,7 @@ fn checksum(body: &[u8]) -> String {
     format!("{first:016x}")
 }
 
-/// Does again what a journal says was done.
+/// Replays the changes in a journal.
 pub(super) fn replay(bytes: &[u8]) -> Result<Replayed, SessionProblem> {
     let mut lines = Lines { rest: bytes };
     let first = lines.next().unwrap_or(RawLine { bytes: b"", is_ended: false, is_last: true });
@@ -205,7 +205,7 @@ fn problem(row: u64, bad: BadLine) -> SessionProblem {
 }
 
 struct RawLine<'a> {
-    /// Without the line end.
+    /// The line without its end.
     bytes: &'a [u8],
     is_ended: bool,
     is_last: bool,
@@ -256,8 +256,7 @@ impl Journal {
         Self::at_end(path, line.len() as u64, sequence)
     }
 
-    /// Goes on with a journal of which the first `length` bytes count. What is behind them is kept in a file beside
-    /// it and cut off.
+    /// Continues a journal whose first `length` bytes are valid. The rest is kept in a file next to it and cut off.
     pub fn open(folder: &Path, length: u64, sequence: u64) -> Result<Self, SessionError> {
         let path = folder.join(JOURNAL);
         let bytes = own_folder::read(&path).map_err(|e| SessionError::unreadable(&path, &e))?;
@@ -320,7 +319,7 @@ impl Journal {
     }
 }
 
-/// Keeps bytes that are cut off: nothing that somebody may want to look at is destroyed.
+/// Keeps bytes that are cut off, as they may be of use to the user.
 fn keep_torn(folder: &Path, torn: &[u8]) -> Result<(), SessionError> {
     let path = (1..u32::MAX).map(|n| folder.join(format!("journal.torn-{n}"))).find(|path| !path.exists());
     let path = path.unwrap_or_else(|| folder.join("journal.torn"));

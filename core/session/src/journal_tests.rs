@@ -205,7 +205,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
     prop::collection::vec(step, 1..60)
 }
 
-/// The entry that a step asks for.
+/// The entry of a step.
 fn entry(step: &Step, history: &History) -> Entry {
     let ids = |ids: &[u32]| ids.iter().copied().map(CaptureId).collect::<Vec<_>>();
     Entry::Edit(match step {
@@ -242,7 +242,7 @@ mod slow {
             let (begin, _) = encode(1, &Entry::begin(&history)).expect("begin");
             let mut bytes = begin.into_bytes();
             let mut sequence = 1;
-            // Where every line ends, and the state there.
+            // The end of every line, and the state there.
             let mut states = vec![(bytes.len(), history.clone())];
             for step in &steps {
                 let (line, read) = encode(sequence + 1, &entry(step, &history)).expect("a line");

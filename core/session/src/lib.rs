@@ -15,8 +15,8 @@
 //! leaves a session with every acknowledged change, and with everything that can be undone and redone. Files of an
 //! interrupted capture do no harm and are overwritten by the next; files of deleted captures stay, for undo.
 //!
-//! [`Document`] is what a session says, [`Edit`] what may be done to it, [`History`] both with undo, [`Store`] all
-//! three on a disk. The layout is described in `docs/reference/session.md`.
+//! [`Document`] is the contents of a session, [`Edit`] a change of it, [`History`] both with undo, [`Store`] all three
+//! on a disk. The layout is described in `docs/reference/session.md`.
 //!
 //! ```
 //! use handeye_estimate::handeye::Mode;
@@ -102,7 +102,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// Whether a folder claims to be a session.
+    /// Whether a folder is marked as a session.
     pub fn is_session(folder: &Path) -> bool {
         own_folder::is_session(folder)
     }
@@ -138,8 +138,8 @@ impl Session {
         Ok(size)
     }
 
-    /// SHA-256 of the captures in use, as [`handeye_dataset::Dataset::input_sha256`] has it of the session's data set, whose
-    /// files need not be there.
+    /// SHA-256 of the captures in use, the same as [`handeye_dataset::Dataset::input_sha256`] of the session's data set,
+    /// whose files need not exist.
     ///
     /// # Errors
     /// [`SessionError`] when an image can no longer be read.

@@ -23,7 +23,7 @@ pub(super) struct Loaded {
     pub history: History,
     /// The number of the last entry; 0 when there was never one.
     pub sequence: u64,
-    /// Bytes of the journal that count; `None` when there is no journal.
+    /// Valid bytes of the journal; `None` when there is no journal.
     pub journal_length: Option<u64>,
 }
 
@@ -47,7 +47,7 @@ pub(super) fn load(folder: &Path) -> Result<Loaded, SessionError> {
     };
     let replayed = journal::replay(&bytes).map_err(|problem| SessionError::new(&path, problem))?;
     let Some(seen) = seen else {
-        // Without a number it is from before the journal, which then has its first entry and no more.
+        // Without a number it is older than the journal, which then has only its first entry.
         return if replayed.rows == 1 {
             Ok(from_journal(replayed))
         } else {
@@ -85,12 +85,12 @@ fn read_file(folder: &Path) -> Result<SessionFile, SessionError> {
     session_file::from_json(&text).map_err(|problem| SessionError::new(&path, problem))
 }
 
-/// Whether the image of every capture is there; it is not decoded.
+/// Whether the image of every capture exists; it is not decoded.
 pub(super) fn check_images(folder: &Path, document: &Document) -> Result<(), SessionError> {
     document.captures.iter().try_for_each(|capture| check_file_of(folder, capture, &capture.image))
 }
 
-/// Whether the files of every capture are there; they are not decoded.
+/// Whether the files of every capture exist; they are not decoded.
 pub(super) fn check_files(folder: &Path, document: &Document) -> Result<(), SessionError> {
     document.captures.iter().try_for_each(|capture| check_files_of(folder, capture))
 }

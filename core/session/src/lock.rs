@@ -11,9 +11,9 @@ use handeye_files::own_folder;
 /// the same name.
 pub(super) const LOCK: &str = ".lock";
 
-/// For how long a lock is waited for. Starting a program takes milliseconds.
+/// Longest wait for a lock. Starting a program takes milliseconds.
 const WAIT: Duration = Duration::from_millis(300);
-/// Between two looks at it.
+/// Interval between two checks of the lock.
 const LOOK: Duration = Duration::from_millis(10);
 
 /// The right to write a folder. The operating system takes it back when the process ends, however it ends.

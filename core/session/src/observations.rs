@@ -11,28 +11,28 @@ use handeye_estimate::robot_accuracy::RobotAccuracy;
 use handeye_estimate::{Observations, ObservedView};
 use handeye_geometry::targets::observation::{Sight, View};
 
-/// What was observed in a session.
+/// The observations of a session.
 #[derive(Debug, Clone)]
 pub struct SessionObservations {
-    /// What goes into the fit. Captures that were taken out of it stand in their place, as views that are not in the fit;
-    /// those kept for verification are not there.
+    /// Input of the fit. Excluded captures keep their place, as views that are not in the fit; those kept for
+    /// verification are not included.
     pub observations: Observations,
     /// The captures of these views, in the same order.
     pub captures: Vec<CaptureId>,
-    /// What verifies: the captures kept for it that were not taken out and in which the target was found.
+    /// The captures kept for verification that were not excluded and in which the target was found.
     pub verification: Vec<(CaptureId, View)>,
     /// The arm, where the joint angles of the captures are used.
     pub arm: Option<ArmOfViews>,
-    /// How accurate the robot is, where something was said of it.
+    /// Accuracy of the robot, where it is stated.
     pub robot_accuracy: Option<RobotAccuracy>,
 }
 
 impl Document {
-    /// What was observed in the captures. `sights` gives what the image of a capture shows, `None` when the target was not found in it;
-    /// `image_size` is width and height of the images in pixels.
+    /// The observations in the captures. `sights` returns what the image of a capture shows, `None` when the target was not found
+    /// in it; `image_size` is width and height of the images in pixels.
     ///
-    /// Joint angles are used where they belong to the poses, see [`Document::placement`]; otherwise a line in the log
-    /// says why not.
+    /// Joint angles are used where they belong to the poses, see [`Document::placement`]; otherwise the log states why
+    /// not.
     pub fn observations(
         &self,
         image_size: (u32, u32),
@@ -90,7 +90,7 @@ impl Document {
 
     fn placement_or_none(&self) -> Option<Placement> {
         self.placement().unwrap_or_else(|why| {
-            // Too few poses to tell where the arm stands are too few for an answer, which says so itself.
+            // Too few poses to determine where the arm is are too few for a result, which reports that itself.
             if !matches!(why, PlacementError::NotPlaced(_)) {
                 tracing::warn!("the joint angles are not used: {why}");
             }

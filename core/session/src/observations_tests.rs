@@ -5,7 +5,7 @@ use crate::tests::{meta, record};
 use crate::{CaptureRecord, Role};
 use handeye_geometry::targets::observation::{Corner, Corners};
 
-/// A corner that tells from which capture it is.
+/// A corner that encodes its capture.
 fn corner_of(id: CaptureId) -> Corners {
     vec![Corner::new(0, Vector2::new(f64::from(id.0), 0.0))].into()
 }

@@ -15,9 +15,9 @@ use super::{RESULT, Session, Store};
 use handeye_files::atomic_file;
 
 impl Store {
-    /// Copies the session with everything that can be undone and redone, and the result beside it, to a folder that
-    /// is empty or not there yet. The copy grows under a hidden name beside its goal and gets its name when it is
-    /// whole. This session stays open as it is. Files that are not of the session are not copied.
+    /// Copies the session with everything that can be undone and redone, and the result next to it, to a folder that is
+    /// empty or does not exist. The copy is written under a hidden name next to its goal and gets its name when it is
+    /// complete. This session stays open as it is. Files that are not of the session are not copied.
     ///
     /// # Errors
     /// [`SessionProblem::Exists`] and [`SessionProblem::NotEmpty`] as [`Self::create`], [`SessionProblem::Locked`]
@@ -42,7 +42,7 @@ impl Store {
             drop(fs::remove_dir_all(&partial));
             return Err(error);
         }
-        // The lock went along with the folder, so nobody else has opened the copy.
+        // The lock was moved with the folder, so no other program has opened the copy.
         Self::open_locked(new_folder, lock)
     }
 
@@ -53,7 +53,7 @@ impl Store {
         for (id, capture) in self.history.reachable_captures() {
             for name in capture.files() {
                 let (from, to) = (self.folder.join(name), goal.join(name));
-                // Undo says so itself when the files of a deleted capture are gone.
+                // Undo itself reports when the files of a deleted capture are missing.
                 if self.document().capture(id).is_none() && !from.is_file() {
                     continue;
                 }
@@ -101,7 +101,7 @@ fn check_is_empty(folder: &Path) -> Result<(), SessionError> {
     }
 }
 
-/// Removes what an interrupted copy has left; the lock says that nobody is at it.
+/// Removes the rest of an interrupted copy; the lock shows that no program is working on it.
 fn clear(partial: &Path) -> Result<(), SessionError> {
     let unwritable = |e| SessionError::unwritable(partial, &e);
     for entry in fs::read_dir(partial).map_err(unwritable)? {

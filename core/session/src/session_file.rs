@@ -10,14 +10,14 @@ use super::error::SessionProblem;
 use handeye_files::json_text;
 use handeye_wording::one_line;
 
-/// What `format` says.
+/// Value of `format`.
 pub const FORMAT: &str = "handeye-session";
 /// The layout: a reader refuses another one.
 pub const MAJOR_VERSION: u32 = 1;
-/// Additions that an older reader may ignore. 1: `sequence`, `last_capture`, `taught`, `export_names`, and what a
-/// capture has from `id` on. 2: `arm`. Without a number of its own, for it is not there where older readers look:
-/// `joint_kinds`, of arms with other joints than six that turn, `cell` of a taught pose, `tool_m` and `robot_accuracy_mm`.
-/// Older readers refuse captures without `base_from_tip`, of a camera without a robot, and an `arm` that is a `chain`.
+/// Additions that an older reader may ignore. 1: `sequence`, `last_capture`, `taught`, `export_names`, and the fields of a
+/// capture from `id` on. 2: `arm`. Without a separate number, as older readers do not read it: `joint_kinds`, for arms
+/// with other joints than six revolute ones, `cell` of a taught pose, `tool_m` and `robot_accuracy_mm`. Older readers
+/// refuse captures without `base_from_tip`, of a camera without a robot, and an `arm` that is a `chain`.
 pub const MINOR_VERSION: u32 = 2;
 
 /// The folder of images in a session.
@@ -100,8 +100,8 @@ pub(super) fn from_json(text: &str) -> Result<SessionFile, SessionProblem> {
     Ok(file)
 }
 
-/// Gives captures of version 1.0 their numbers: that of the image, or where another has it or there is none, one past
-/// all others.
+/// Gives captures of version 1.0 their numbers: that of the image, or where it is taken or missing, one past all
+/// others.
 fn number_captures(captures: &mut [CaptureRecord]) {
     let mut used: BTreeSet<CaptureId> = captures.iter().map(|capture| capture.id).collect();
     let unnumbered = |capture: &&mut CaptureRecord| capture.id == CaptureId::none();

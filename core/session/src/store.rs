@@ -26,8 +26,8 @@ use handeye_files::{atomic_file, own_folder};
 use handeye_geometry::depth::DepthImage;
 use handeye_result::{CalibrationResult, ResultError};
 
-/// A session folder and the right to change it. What a method was told is on the disk when it returns, and survives a
-/// kill or a power cut.
+/// A session folder and the right to change it. A change is on the disk when its method returns, and survives a kill or
+/// a power cut.
 #[derive(Debug)]
 pub struct Store {
     pub(super) folder: PathBuf,
@@ -47,7 +47,7 @@ impl Store {
         Self::create_with(folder, Document::new(meta))
     }
 
-    /// Begins a session with what a document says, for example taught poses, which are then no change to undo.
+    /// Begins a session with the contents of a document, for example taught poses, which then cannot be undone.
     ///
     /// # Errors
     /// As [`Self::create`].
@@ -90,7 +90,7 @@ impl Store {
         Self { folder: folder.to_path_buf(), journal, history, derived, _lock: lock }.ready()
     }
 
-    /// Makes what is beside the journal as it should be.
+    /// Brings the files next to the journal up to date.
     fn ready(mut self) -> Result<Self, SessionError> {
         for name in [IMAGES, DEPTH] {
             make_folder(&self.folder.join(name))?;
@@ -146,12 +146,12 @@ impl Store {
         self.commit(Entry::Edit(edit))
     }
 
-    /// Begins the session again with another document, as long as no capture was ever in it; whether it did. What was changed before
-    /// can then no longer be undone.
+    /// Begins the session again with another document, as long as no capture was ever in it; whether it did. What was changed
+    /// before can then no longer be undone.
     ///
     /// # Errors
-    /// As [`Self::create_with`] for the document, and [`Self::apply`] for the disk; nothing more is written then until the session is
-    /// opened again.
+    /// As [`Self::create_with`] for the document, and [`Self::apply`] for the disk; nothing more is written then until the
+    /// session is opened again.
     pub fn begin_again(&mut self, document: Document) -> Result<bool, SessionError> {
         let is_empty = self.history.last_capture() == CaptureId(0) && document.captures.is_empty();
         if !is_empty || **self.document() == document {
@@ -176,7 +176,7 @@ impl Store {
     /// Takes the last change back.
     ///
     /// # Errors
-    /// As [`Self::apply`]; also when a file of a capture that would come back is gone.
+    /// As [`Self::apply`]; also when a file of a capture that would be restored is missing.
     pub fn undo(&mut self) -> Result<(), SessionError> {
         self.commit(Entry::Undo)
     }
@@ -195,7 +195,7 @@ impl Store {
         let prepared = match self.journal.prepare(&entry) {
             Ok(prepared) => prepared,
             Err(error) => {
-                // What is wrong with the change says more than that it cannot be written down.
+                // The error of the change is more useful than the error of writing it.
                 step(&mut next, entry).map_err(refused)?;
                 return Err(error);
             }
@@ -212,7 +212,7 @@ impl Store {
         self.derived.update(&self.folder, &self.history, self.journal.sequence())
     }
 
-    /// Writes the result of a calibration beside the session, completely or not at all.
+    /// Writes the result of a calibration next to the session, completely or not at all.
     ///
     /// # Errors
     /// [`ResultError`]; what was there before is then still there.
@@ -284,7 +284,7 @@ fn check_free(folder: &Path) -> Result<(), SessionError> {
     Ok(())
 }
 
-/// Removes what writes have left that a kill or a power cut interrupted. The lock says that nobody is at one.
+/// Removes the rest of writes that a kill or a power cut interrupted. The lock shows that none is under way.
 fn remove_partial_files(folder: &Path) {
     let of_capture = |name: &str| {
         let number: String = name.chars().skip(1).take_while(char::is_ascii_digit).collect();
@@ -293,13 +293,13 @@ fn remove_partial_files(folder: &Path) {
     let of_session = |name: &str| derived::NAMES.iter().chain(&[JOURNAL]).any(|of| is_partial(name, of));
     for sub in ["", IMAGES, DEPTH] {
         let folder = folder.join(sub);
-        // What lies behind a link is not the session's.
+        // Files behind a link do not belong to the session.
         let Ok(entries) = own_folder::check_folder(&folder).and_then(|()| fs::read_dir(&folder)) else { continue };
         for entry in entries.flatten() {
             let name = entry.file_name().to_string_lossy().into_owned();
             let is_left = if sub.is_empty() { of_session(&name) } else { of_capture(&name) };
             if is_left {
-                // Best effort: it is in nobody's way.
+                // Best effort: it does no harm.
                 drop(fs::remove_file(entry.path()));
             }
         }

@@ -103,7 +103,7 @@ fn create_never_replaces_anything() {
     let fresh = home.path().join("fresh");
     assert!(matches!(Store::create(&fresh, unusable).expect_err("no grid").problem, SessionProblem::Edit(_)));
     assert!(!fresh.exists());
-    // What is left when the program was killed before the session began.
+    // The folder as left when the program was killed before the session began.
     fs::create_dir(&fresh).expect("folder");
     for name in [".lock", ".journal.jsonl.partial", ".session.json.partial"] {
         fs::write(fresh.join(name), "{\"se").expect("write");
@@ -274,7 +274,7 @@ fn a_document_that_is_ahead_of_its_journal_says_that_entries_are_missing() {
         assert!(matches!(error.problem, SessionProblem::Damaged { row: 4, .. }), "{error}");
         assert!(error.to_string().contains("journal.jsonl") && error.to_string().contains("row 4"), "{error}");
     }
-    // What the message says to do, with both outcomes.
+    // The advice of the message, with both outcomes.
     fs::remove_file(dir.path().join(JOURNAL)).expect("move it away");
     let mut store = Store::open(dir.path()).expect("open");
     assert_eq!((store.document().captures.len(), store.history().undo_edit()), (1, None));
@@ -300,7 +300,7 @@ fn a_copy_is_complete_and_independent() {
     store.apply(delete(3)).expect("delete");
     store.write_result(&CalibrationResult::default()).expect("result");
     fs::write(from.join("notes.txt"), "mine").expect("write");
-    // What an interrupted copy leaves.
+    // The files that an interrupted copy leaves.
     fs::create_dir_all(home.path().join("deep/.b.partial/images")).expect("folder");
     fs::write(home.path().join("deep/.b.partial/.lock"), "").expect("write");
     fs::write(home.path().join("deep/.b.partial/images/0009.png"), "half").expect("write");

@@ -40,7 +40,7 @@ pub(super) fn meta() -> SessionMeta {
     }
 }
 
-/// A capture as documents have it; there need not be files.
+/// A capture as in documents; its files need not exist.
 pub(super) fn record(id: u32) -> CaptureRecord {
     CaptureRecord {
         id: CaptureId(id),
@@ -141,7 +141,7 @@ fn a_session_reads_back_bit_for_bit_and_is_a_dataset() {
     assert_eq!(names(&dir), files);
 }
 
-/// Of images alone there is a camera to calibrate, in the window and for other programs.
+/// With images only, the camera is calibrated, in the window and for other programs.
 #[test]
 fn images_alone_are_a_session_without_a_robot_and_their_data_set_has_those_in_use() {
     let dir = folder();

@@ -5,32 +5,31 @@ use nalgebra::{Isometry3, SMatrix, Translation3, UnitQuaternion, Vector3, Vector
 use handeye_arm::{ArmKind, DhRow};
 use handeye_geometry::frames::{Base, Pose, Tip};
 
-/// Where the search for joint angles starts.
+/// Starts of the search for joint angles.
 const STARTS: [[f64; 6]; 3] =
     [[0.0, -1.2, 1.6, -1.9, -1.5, 0.0], [0.4, -1.6, 2.0, -2.0, -1.6, 1.0], [-0.4, -1.0, 1.2, -1.7, -1.4, -1.0]];
 
-/// What every link has more than its data sheet says: `a`, `d` in metres, `alpha` and the joint's zero in radians.
+/// Deviations of every link from its data sheet: `a`, `d` in metres, `alpha` and the joint's zero in radians.
 pub type LinkErrors = [[f64; 4]; 6];
 
-/// An arm of servo motors: what lies between the angles that are commanded and reported, and where the links are.
+/// An arm of servo motors: the errors between the commanded and reported angles, and the links.
 #[derive(Debug, Clone, Copy)]
 pub struct Servo {
     /// A gear or sensor that is not centred: amplitude \[rad\] once per turn, and its phase, of every joint.
     pub eccentric: [[f64; 2]; 6],
     /// Play of every joint, radians: a link stays behind by half of it on the side that it comes from.
     pub play_rad: [f64; 6],
-    /// How far shoulder, elbow and wrist give way under the weight of a horizontal arm, radians.
+    /// Deflections of shoulder, elbow and wrist under the weight of a horizontal arm, radians.
     pub sag_rad: [f64; 3],
     /// Step of the sensor, radians.
     pub step_rad: f64,
 }
 
-/// Where the joints were commanded to before, and how far behind that the links are, radians.
+/// Previous command of the joints, and how far the links are behind it, radians.
 pub(crate) type Before = Option<([f64; 6], [f64; 6])>;
 
 impl Servo {
-    /// Where the links are that are commanded to `joints`, in an arm whose links were behind the commanded angles by `behind`,
-    /// which is brought up to date.
+    /// True angles of the links for the command `joints`; `last` is the previous state of the arm, which is updated.
     pub(crate) fn really(&self, joints: &[f64; 6], last: &mut Before) -> [f64; 6] {
         let (before, behind) = last.unwrap_or((*joints, [0.0; 6]));
         // A joint goes through its play before it takes the link along.
@@ -59,7 +58,7 @@ impl Servo {
 pub(crate) struct Ur5([DhRow; 6]);
 
 impl Ur5 {
-    /// As the data sheet has it.
+    /// As in the data sheet.
     pub fn as_stated() -> Self {
         Self(ArmKind::Ur5.rows())
     }
@@ -131,9 +130,8 @@ impl Ur5 {
     }
 }
 
-/// Whether the arm stands as it does in a session that is moved through without turning over: in front of its base, not
-/// bent backwards over its shoulder, the elbow up and the wrist to one side. The errors of its links are other ones on every
-/// branch.
+/// Whether the configuration is that of a session that is moved through without turning over: in front of its base, not bent
+/// backwards over its shoulder, the elbow up and the wrist to one side. The errors of its links differ on every branch.
 fn is_usual(joints: &[f64; 6]) -> bool {
     let [_, upper, fore, _, hand, _] = ArmKind::Ur5.rows();
     let [base, shoulder, elbow, wrist_1, wrist_2, _] = joints.map(|angle| angle.sin().atan2(angle.cos()));

@@ -25,7 +25,7 @@ pub struct BoardViews {
     pub tilt: (f64, f64),
     /// Least and most distance, metres.
     pub distance_m: (f64, f64),
-    /// How far the board's middle is imaged from the principal point at the most, pixels.
+    /// Largest distance of the image of the board's middle from the principal point, pixels.
     pub offset_px: (f64, f64),
     /// Standard deviation of a corner per axis, pixels.
     pub noise_px: f64,
@@ -58,10 +58,10 @@ impl BoardViews {
         }
     }
 
-    /// The corners of so many views.
+    /// The corners of `count` views.
     ///
     /// # Panics
-    /// When a corner is behind the camera, or the noise is no standard deviation.
+    /// When a corner is behind the camera, or the noise is not a standard deviation.
     pub fn corners(&self, count: usize, seed: u64) -> Vec<Vec<Corner>> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let noise = Normal::new(0.0, self.noise_px).expect("a deviation");

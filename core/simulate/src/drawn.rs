@@ -84,7 +84,7 @@ impl Eye<'_> {
     }
 }
 
-/// Which shapes there are in which part of the drawing.
+/// Shapes by part of the drawing.
 struct Buckets {
     low: Vector2<f64>,
     high: Vector2<f64>,

@@ -83,7 +83,7 @@ fn wave(x: f64, sigma: f64, corners: usize) -> f64 {
     }
     let nearest = x.floor() as i32;
     let sign = |i: i32| if i.rem_euclid(2) == 0 { 1.0 } else { -1.0 };
-    // What blurring adds to the sharp wave: only steps within a few squares do.
+    // The change of the sharp wave by blurring: only steps within a few squares do.
     let blurred = |i: i32| {
         let t = x - f64::from(i);
         sign(i) * (libm::erf(t / (sigma * std::f64::consts::SQRT_2)) - if t < 0.0 { -1.0 } else { 1.0 })

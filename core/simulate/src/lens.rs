@@ -1,11 +1,11 @@
-//! Where a lens puts a point, written out from the published formulas: no line of it is shared with the estimator's lenses, which
-//! a test compares it with.
+//! Projection of a point by a lens, written out from the published formulas: no line of it is shared with the estimator's lenses,
+//! which a test compares it with.
 
 use nalgebra::{Point3, Vector2};
 
 use handeye_geometry::camera::{Distortion, Intrinsics};
 
-/// The pixel of a point in the camera's frame; `None` where it has none.
+/// The pixel of a point in the camera's frame; `None` where there is none.
 pub fn pixel(camera: &Intrinsics, point: &Point3<f64>) -> Option<Vector2<f64>> {
     let across = point.x.hypot(point.y);
     let on_image = match camera.distortion {
@@ -28,8 +28,8 @@ pub fn pixel(camera: &Intrinsics, point: &Point3<f64>) -> Option<Vector2<f64>> {
     Some(Vector2::new(camera.fx * on_image.x + camera.cx, camera.fy * on_image.y + camera.cy))
 }
 
-/// Radial and tangential distortion of a point of the plane at depth 1: `above` over `below` in even powers of the distance from the
-/// axis, and decentred by `p`.
+/// Radial and tangential distortion of a point of the plane at depth 1: `above` over `below` in even powers of the distance from
+/// the axis, and decentred by `p`.
 fn brown(above: [f64; 3], below: [f64; 3], p: [f64; 2], at: Vector2<f64>) -> Vector2<f64> {
     let square = at.norm_squared();
     let series = |k: [f64; 3]| 1.0 + k[0] * square + k[1] * square.powi(2) + k[2] * square.powi(3);

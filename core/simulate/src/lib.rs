@@ -1,7 +1,8 @@
-//! Sessions and images of which the truth is known, for tests, studies and benchmarks. No shipped program has it.
+//! Sessions and images with known ground truth, for tests, studies and benchmarks. No shipped program contains this
+//! crate.
 //!
-//! Where lenses, links and arms put things is written out here: from `handeye_geometry` and `handeye_arm` come types and the
-//! numbers of data sheets alone, so that an estimator is not judged by its own formulas.
+//! Lenses, links and arms are written out here: only types and the numbers of data sheets come from `handeye_geometry` and
+//! `handeye_arm`, so that an estimator is not judged by its own formulas.
 //!
 //! | module | sessions |
 //! | --- | --- |
@@ -15,8 +16,8 @@
 //! | [`moving_board`] | a chessboard that moves, with depths |
 //! | [`flat_board`] | a chessboard seen straight on, whose blur, by a motion too, is a Gaussian and known |
 //!
-//! Chessboards are drawn by `handeye_render`, but for `flat_board`: it knows neither motion nor a pixel without an area, and neither
-//! marks nor dots.
+//! Chessboards are drawn by `handeye_render`, except for `flat_board`: it has neither motion nor a pixel without an area, and
+//! neither marks nor dots.
 //!
 //! ```
 //! use handeye_geometry::camera::Intrinsics;

@@ -1,4 +1,4 @@
-//! Where camera and target are fixed, and what follows from it.
+//! The mounts of camera and target, and the poses that follow from them.
 
 use nalgebra::{Isometry3, Matrix4, Rotation3, Translation3, UnitQuaternion, Vector3, Vector6};
 use rand::{Rng, RngExt as _};
@@ -17,7 +17,7 @@ pub struct Links {
 }
 
 impl Links {
-    /// By place \[m\] and rotation vector \[rad\] of camera and target.
+    /// From position \[m\] and rotation vector \[rad\] of camera and target.
     pub fn at(mode: Mode, camera: [[f64; 3]; 2], target: [[f64; 3]; 2]) -> Self {
         let at = |[place, turn]: [[f64; 3]; 2]| Isometry3::new(place.into(), turn.into());
         Self {
@@ -27,7 +27,7 @@ impl Links {
         }
     }
 
-    /// Where the camera has the target with the tip there.
+    /// Pose of the target in the camera with the tip there.
     pub fn camera_from_target(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Camera, Target> {
         let (camera, target) = (self.mount_from_camera.isometry(), self.anchor_from_target.isometry());
         let tip = base_from_tip.isometry();
@@ -37,7 +37,7 @@ impl Links {
         })
     }
 
-    /// Where the tip is for the camera to have the target there.
+    /// Pose of the tip that gives the camera this pose of the target.
     pub fn base_from_tip(&self, camera_from_target: &Pose<Camera, Target>) -> Pose<Base, Tip> {
         let (camera, target) = (self.mount_from_camera.isometry(), self.anchor_from_target.isometry());
         let seen = camera_from_target.isometry();
@@ -58,7 +58,7 @@ pub fn noise_twist(rng: &mut impl Rng, metres: f64, radians: f64) -> Vector6<f64
     Vector6::from_fn(|i, _| normal(rng) * if i < 3 { metres } else { radians })
 }
 
-/// What the robot errs by at a pose: true = reported · error.
+/// Error of the robot at a pose: true = reported · error.
 pub fn robot_error(rng: &mut impl Rng, noise: &Noise) -> Isometry3<f64> {
     shift_and_turn(&noise_twist(rng, noise.robot_m, noise.robot_rad))
 }
@@ -88,14 +88,14 @@ pub fn screw(twist: &Vector6<f64>) -> Isometry3<f64> {
 /// Errors of a robot that are affine in where the tip is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Field {
-    /// Where it has none, metres in the base.
+    /// Point without error, metres in the base.
     pub origin_m: Vector3<f64>,
     /// Metres and radians in the axes of the tip, per metre along each axis of the base.
     pub slopes: nalgebra::SMatrix<f64, 6, 3>,
 }
 
 impl Field {
-    /// What the robot errs by at a reported pose: true = reported · error.
+    /// Error of the robot at a reported pose: true = reported · error.
     pub fn error(&self, base_from_tip: &Pose<Base, Tip>) -> Isometry3<f64> {
         shift_and_turn(&(self.slopes * (base_from_tip.translation() - self.origin_m)))
     }

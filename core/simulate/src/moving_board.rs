@@ -38,7 +38,7 @@ pub struct Stage {
     pub blur_px: f64,
     /// 1σ \[grey levels\].
     pub noise: f64,
-    /// What is in front of the board.
+    /// Objects in front of the board.
     pub covers: Vec<Cover>,
     /// 1σ of depths \[m\].
     pub depth_noise_m: f64,
@@ -89,7 +89,7 @@ impl Stage {
     }
 }
 
-/// The board with so many squares of paper around its print, before the camera.
+/// The board with `margin` squares of paper around its print, in front of the camera.
 fn sheet(camera_from_target: &Isometry3<f64>, margin: f64) -> RenderScene {
     let side = |corners: usize| (corners as f64 + 1.0 + 2.0 * margin) * GRID.square_m;
     let paper_m = [side(GRID.columns), side(GRID.rows)];

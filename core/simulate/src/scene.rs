@@ -15,14 +15,15 @@ use handeye_render::{BoardSurface, Light, LightSource, RenderScene, Renderer};
 
 /// An image to be taken of a target.
 ///
-/// A chessboard by [`Scene::new`] has the exact area of every pixel, on paper that has no end in the image. Any target by `Scene::drawn` (feature `print`)
-/// is the drawing that is printed, sampled ten by ten in pixels that an outline crosses, on its paper on a table.
+/// A chessboard by [`Scene::new`] has the exact area of every pixel, on paper that has no end in the image. Any target by
+/// `Scene::drawn` (feature `print`) is the drawing that is printed, sampled ten by ten in pixels that an outline crosses, on its
+/// paper on a table.
 pub struct Scene {
     /// The camera, with its lens.
     pub camera: Intrinsics,
-    /// What is looked at.
+    /// The target.
     pub target: TargetSpec,
-    /// Where it is.
+    /// Pose of the target.
     pub camera_from_target: Isometry3<f64>,
     /// Standard deviation of the lens blur in pixels, on top of the pixel's own area.
     pub blur_px: f64,
@@ -103,7 +104,7 @@ impl Scene {
         }
     }
 
-    /// Where all points are, in sight or not.
+    /// True positions of all points, visible or not.
     ///
     /// # Panics
     /// When one is behind the camera.
@@ -112,7 +113,7 @@ impl Scene {
         points.map(|p| self.camera.project(&(self.camera_from_target * p)).expect("in front")).collect()
     }
 
-    /// The image with noise of its own.
+    /// The image with its own noise.
     pub fn render(&self, seed: u64) -> GrayImage {
         self.render_with(&mut ChaCha8Rng::seed_from_u64(seed))
     }

@@ -36,7 +36,7 @@ pub fn camera() -> Intrinsics {
 pub fn links(mode: Mode) -> Links {
     let pi = std::f64::consts::PI;
     match mode {
-        // Board on the table, face up; camera beside the flange, looking along it.
+        // Board on the table, face up; camera next to the flange, looking along it.
         Mode::EyeInHand => {
             Links::at(mode, [[0.05, 0.01, 0.06], [0.1, -0.05, 1.4]], [[0.42, 0.06, 0.02], [pi - 0.04, 0.03, 0.05]])
         }
@@ -47,7 +47,7 @@ pub fn links(mode: Mode) -> Links {
     }
 }
 
-/// How a target lies before the camera in views that are drawn at random.
+/// Range of the target's poses in front of the camera in random views.
 #[derive(Debug, Clone)]
 pub struct Cone {
     /// Largest tilt, degrees.
@@ -56,14 +56,14 @@ pub struct Cone {
     pub roll_deg: f64,
     /// Distances of the target's middle, metres.
     pub distance_m: Range<f64>,
-    /// How far that is beside the optical axis along x and y at the most, metres.
+    /// Largest distance of the middle from the optical axis along x and y, metres.
     pub beside_m: f64,
-    /// Whether the distance is drawn before the place beside the axis: some figures of the documentation were drawn so.
+    /// Whether the distance is drawn before the place off the axis: some figures of the documentation were drawn so.
     pub distance_first: bool,
 }
 
 impl Cone {
-    /// That of the published Monte-Carlo tables.
+    /// The range of the published Monte-Carlo tables.
     pub const PUBLISHED: Self =
         Self { tilt_deg: 35.0, roll_deg: 60.0, distance_m: 0.4..0.6, beside_m: 0.03, distance_first: false };
 
@@ -79,18 +79,18 @@ impl Cone {
     }
 }
 
-/// `camera_from_target` with the middle of the target at `place` \[m\] in the camera's frame, tilted about an axis at `azimuth` in the
-/// image after a turn by `roll` about its normal \[rad\].
+/// `camera_from_target` with the middle of the target at `place` \[m\] in the camera's frame, tilted about an axis at `azimuth`
+/// in the image after a turn by `roll` about its normal \[rad\].
 fn target_at(target: &TargetSpec, place: Vector3<f64>, [tilt, azimuth, roll]: [f64; 3]) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * tilt)
         * UnitQuaternion::from_scaled_axis(Vector3::z() * roll);
     Isometry3::from_parts(place.into(), turn) * Isometry3::from(-target.centre().coords)
 }
 
-/// How views are taken, and what is wrong.
+/// How views are taken, and their faults.
 #[derive(Debug, Clone)]
 pub struct Setup {
-    /// Where camera and target are.
+    /// Mounts of camera and target.
     pub links: Links,
     /// The target as it is stated.
     pub target: TargetSpec,
@@ -98,7 +98,7 @@ pub struct Setup {
     pub camera: Intrinsics,
     /// Number of views.
     pub views: usize,
-    /// How the target lies before the camera.
+    /// Range of the target's poses in front of the camera.
     pub cone: Cone,
     /// Noise of corners and robot. Errors that depend on the place are drawn with its levels.
     pub noise: Noise,
@@ -106,33 +106,33 @@ pub struct Setup {
     pub estimated: bool,
     /// Whether joint angles are known.
     pub joints: bool,
-    /// Errors of the arm that depend on where it stands.
+    /// Errors of the arm that depend on its configuration.
     pub arm_error: ArmError,
     /// Errors of corners that neighbours share: bends of the grid in the image, pixels.
     pub shared_px: f64,
     /// Views are taken level by level, each along a round, as a person or a plan does; otherwise in no order.
     pub by_level: bool,
-    /// Of the random numbers.
+    /// Seed of the random numbers.
     pub seed: u64,
-    /// What is wrong.
+    /// Fault of the data.
     pub fault: Fault,
 }
 
-/// Errors of an arm that depend on where it stands.
+/// Errors of an arm that depend on its configuration.
 #[derive(Debug, Clone, Copy, Default)]
 pub enum ArmError {
-    /// None besides the noise.
+    /// None in addition to the noise.
     #[default]
     None,
     /// A twist of the tip that grows with its place in the base, per metre from the middle of the places.
     Affine(SMatrix<f64, 6, 3>),
-    /// What is wrong with every link.
+    /// Errors of every link.
     Links(LinkErrors),
-    /// What lies between the angles and the links of an arm of servo motors; it depends on where the arm came from, too.
+    /// Errors between the angles and the links of an arm of servo motors; it depends on where the arm came from, too.
     Servo(Servo),
 }
 
-/// What is wrong.
+/// A fault of the data.
 #[derive(Debug, Clone, Default)]
 pub struct Fault {
     /// The target moves before this view by a twist in its frame.
@@ -230,7 +230,7 @@ impl Session {
     /// Displaces the points of the target in its plane, metres, and its corners with them.
     ///
     /// # Panics
-    /// When one comes to lie behind the camera.
+    /// When a point gets behind the camera.
     pub fn add_print_errors(&mut self, errors_m: &[Vector2<f64>]) {
         for (view, pose) in self.views.iter_mut().zip(&self.true_camera_from_target) {
             for corner in &mut view.corners {
@@ -279,7 +279,7 @@ pub fn session_of(setup: &Setup, planned: &[Isometry3<f64>]) -> Session {
     camera.session(taken)
 }
 
-/// What an estimator is given of a session: corners and poses, and the camera as the setup says.
+/// Input of an estimator for a session: corners and poses, and the camera as in the setup.
 pub fn observed(setup: &Setup) -> Observations {
     with_camera(setup, &session(setup))
 }
@@ -316,7 +316,7 @@ pub fn small_target_trial(
     session(&Setup { target: SMALL_TARGET, cone, ..setup })
 }
 
-/// How [`SMALL_TARGET`] is looked at: from 0.5 m to the farthest, tilted by up to an angle.
+/// Views of [`SMALL_TARGET`]: from 0.5 m to the farthest, tilted by up to an angle.
 #[derive(Debug, Clone, Copy)]
 pub struct SmallTarget {
     /// Largest distance, metres.
@@ -335,11 +335,11 @@ fn oblique(mode: Mode, views: usize, noise: &Noise, camera: Intrinsics, seed: u6
     Setup { links, camera, cone, noise: *noise, ..Setup::new(mode, views, seed) }
 }
 
-/// Takes the views of a setup one after the other.
+/// Takes the views of a setup in turn.
 struct CameraAtWork<'a> {
     setup: &'a Setup,
     rng: ChaCha8Rng,
-    /// Where the joints were before, and how far behind them the links.
+    /// Previous joints, and how far the links are behind them.
     before: Before,
     /// The target as it is.
     points: Vec<Point3<f64>>,
@@ -352,7 +352,7 @@ impl<'a> CameraAtWork<'a> {
         Self { setup, rng: ChaCha8Rng::seed_from_u64(setup.seed), before: None, points }
     }
 
-    /// One view: the robot reports the pose planned, and is somewhere else by its noise and the faults; `None` where the arm does not
+    /// One view: the robot reports the planned pose, and its true pose differs by noise and faults; `None` where the arm does not
     /// get there, or the target is not wholly in sight.
     fn take(&mut self, index: usize, planned: &Isometry3<f64>) -> Option<(View, Pose<Camera, Target>)> {
         let Setup { links, fault, noise, .. } = self.setup;
@@ -379,7 +379,8 @@ impl<'a> CameraAtWork<'a> {
         Some((view, camera_from_target))
     }
 
-    /// What the arm is off by at a reported pose besides its noise, and where its joints are at the tip where they are known.
+    /// Error of the arm at a reported pose in addition to its noise, and the poses of its joints relative to the tip where
+    /// they are known.
     fn arm_off(&mut self, reported: &Pose<Base, Tip>) -> Option<(Isometry3<f64>, Vec<Isometry3<f64>>)> {
         let Setup { joints: known, fault, arm_error, .. } = self.setup;
         let mut off = Isometry3::identity();
@@ -472,8 +473,8 @@ pub fn add_field(rng: &mut impl Rng, noise: &Noise, views: &mut [View]) {
     }
 }
 
-/// The points of a sheet that is printed too large by a factor, and whose middle is off its edges by `warp_m` along x and along y, metres
-/// into the sheet: a parabola each way, over the points of its outline.
+/// The points of a sheet that is printed too large by a factor, and whose middle is displaced from its edges by `warp_m` along x
+/// and along y, metres into the sheet: a parabola each way, over the points of its outline.
 pub fn bent(points: &[Point3<f64>], warp_m: [f64; 2], scale: f64) -> Vec<Point3<f64>> {
     let range = |axis: usize| {
         let values = points.iter().map(|point| point[axis]);

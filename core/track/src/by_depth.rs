@@ -24,7 +24,7 @@ struct Point {
 }
 
 /// The board by the depths at the corners `seen`; `None` when fewer than four corners, or corners on one line only, have
-/// one. The pose by corners serves to tell depths of the board from depths of something else, no more.
+/// one. The pose by corners only serves to distinguish depths of the board from depths of other objects.
 pub(super) fn by_depth(
     image: &Image<'_>,
     depth: &DepthImage,
@@ -62,7 +62,7 @@ fn in_base(base_from_camera: &Pose<Base, Camera>, point: Point3<f64>) -> Point3<
     (*base_from_camera * PointIn::<Camera>::new(point)).point()
 }
 
-/// Where the ray through the corner has the corner's depth.
+/// Point on the ray through the corner at the corner's depth.
 fn point_at(depth: &DepthImage, corner: &Corner, far_m: f32, calibrated: &Predictor) -> Option<Point3<f64>> {
     let depth_m = depth.at(corner.px, far_m)?;
     let ray = calibrated.intrinsics.unproject(&corner.px).ok()?;

@@ -12,7 +12,7 @@ use nalgebra::{SMatrix, SVector, Vector2};
 use handeye_detect::checkerboard::saddle;
 use handeye_detect::checkerboard::subpixel::erf_and_slope;
 
-/// Where a corner is expected and how the board lies there.
+/// Expected position of a corner and orientation of the board there.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place {
     pub px: Vector2<f64>,
@@ -210,7 +210,7 @@ pub(super) fn exactly(image: &GrayImage, place: &Place, blur_px: f64) -> Option<
 
 /// Gauss–Newton with steps cut short.
 fn fit(patch: &Patch, place: &Place, blur_px: f64) -> Option<Found> {
-    // Normals of both edges; their product is positive in the squares beside the one between both directions.
+    // Normals of both edges; their product is positive in the squares adjacent to the one between both directions.
     let normal = |along: Vector2<f64>| Vector2::new(-along.y, along.x) / along.norm();
     let (n1, n2) = (normal(place.along_x), normal(place.along_y));
     let mut x = start(patch, &n1, &n2, blur_px);
@@ -218,7 +218,7 @@ fn fit(patch: &Patch, place: &Place, blur_px: f64) -> Option<Found> {
     for _ in 0..MAX_STEPS {
         let sums = sums(patch, &x, &n1, &n2);
         let mut step: Parameters = -sums.hessian.cholesky()?.solve(&sums.gradient);
-        // What the model is expected to leave after this step.
+        // Expected residual of the model after this step.
         let left = (sums.cost + step.dot(&sums.gradient)).max(0.0);
         misfit = (left / patch.pixels.len() as f64).sqrt();
         let length = step[0].hypot(step[1]);

@@ -1,13 +1,14 @@
-//! How the board is tilted by its depths: a pose from corners knows that worst, and depths of a plane know it best.
+//! Tilt of the board from its depths: a pose from corners determines it worst, and depths of a plane best.
 //!
-//! Over a plane `n · X = h` the inverse depth is linear in the ray `(x, y, 1)` of a pixel: `1/z = c · (x, y, 1)` with
-//! `c = n / h`. Its two slopes tell the tilt; the constant is left open, so that it does not matter how far away the depth
-//! camera puts the board. A renderer's polygon offset, which adds a part of the depth's slope in a pixel, is a constant of the
+//! Over a plane `n · X = h` the inverse depth is linear in the ray `(x, y, 1)` of a pixel: `1/z = c · (x, y, 1)` with `c = n /
+//! h`. Its two slopes determine the tilt; the constant is free, so that an error of the depth camera in the board's distance
+//! does not matter. A renderer's polygon offset, which adds a part of the depth's slope in a pixel, is a constant of the
 //! inverse depth as well and drops out.
 //!
 //! The noise is that of the depths themselves, and counts as if all of it were common to the whole board, because the errors
-//! of a depth camera are neighbours' errors: `N` depths know the slopes as well as one plane of their scatter. An error of
-//! scale or offset makes slopes wrong by as much as distances; how much that is shows where the corners put the board.
+//! of a depth camera are correlated between neighbours: `N` depths determine the slopes as well as one plane of their
+//! scatter. An error of scale or offset makes slopes wrong by as much as distances; its size follows from the distance of
+//! the board by its corners.
 
 use nalgebra::{Isometry3, Matrix2, Matrix2x6, Matrix3, Matrix6, Vector2, Vector3, Vector6};
 
@@ -17,7 +18,8 @@ use handeye_geometry::se3;
 use handeye_geometry::statistics::median_high;
 use handeye_geometry::targets::TargetSpec;
 
-/// Least part of the places that have a depth of the board's plane: with fewer a thing before the board may be taken for it.
+/// Least part of the places that have a depth of the board's plane: with fewer an object in front of the board may be
+/// mistaken for it.
 const LEAST: f64 = 0.3;
 const ROUNDS: usize = 4;
 /// An error of scale makes the slopes wrong by as much as the distance, and an offset by twice as much.
@@ -44,7 +46,7 @@ pub(super) struct Tilted {
 }
 
 impl DepthTilt {
-    /// Of a board near `camera_from_target`; `None` where too little of it has depths of one plane.
+    /// For a board near `camera_from_target`; `None` where too little of it has depths of one plane.
     pub fn new(
         depth: &DepthImage,
         far_m: f32,
@@ -61,7 +63,7 @@ impl DepthTilt {
             let ray = Vector3::new(point.x / point.z, point.y / point.z, 1.0);
             samples.push(Sample { ray, inverse: 1.0 / depth_m, depth_m, off_m: depth_m - point.z });
         }
-        // One offset of all depths is none of the tilt.
+        // A common offset of all depths does not affect the tilt.
         let middle = median_high(samples.iter().map(|sample| sample.off_m))?;
         for sample in &mut samples {
             sample.off_m -= middle;
@@ -130,7 +132,7 @@ struct Sample {
 /// A plane by its inverse depth.
 struct Plane {
     inverse: Vector3<f64>,
-    /// Of that, for samples of a variance of one.
+    /// Its information matrix, for samples of a variance of one.
     information: Matrix3<f64>,
 }
 

@@ -7,15 +7,15 @@ use crate::moving_board::{FAR_M, Stage, Watch, board_at, lens};
 use handeye_geometry::testing::BOARD;
 use handeye_simulate::links::normal;
 
-/// What corners with hard edges leave open, about the middle of the board: four tenths of a degree of tilt.
+/// Uncertainty of a pose from corners with hard edges, about the middle of the board: four tenths of a degree of tilt.
 const CORNERS: [f64; 6] = [5e-5, 5e-5, 1e-4, 7e-3, 7e-3, 3e-4];
 
 fn truth(tilt: Vector3<f64>) -> Isometry3<f64> {
     Watch::new().camera_from_target(&board_at(Vector3::zeros(), tilt))
 }
 
-/// By corners that are off by chance, and by the depths of `stage` that `change` has made something of; both as twists
-/// from the truth, with the squared Mahalanobis distance of the second.
+/// Estimates from noisy corners, and from the depths of `stage` as modified by `change`; both as twists from the truth,
+/// with the squared Mahalanobis distance of the second.
 fn both(
     stage: &Stage,
     tilt: Vector3<f64>,
@@ -79,7 +79,7 @@ fn a_polygon_offset_makes_no_tilt() {
     assert!(tilt_of(&left).to_degrees() < 0.01, "{}", tilt_of(&left).to_degrees());
 }
 
-/// A depth camera of a scale, an offset and a noise of its own must not make a pose worse without saying so.
+/// A depth camera with a scale error, an offset and noise must not make a pose worse without a larger covariance.
 #[test]
 fn what_a_depth_camera_is_off_is_in_the_covariance() {
     type Change = fn(f64) -> f64;

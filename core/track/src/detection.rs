@@ -46,22 +46,22 @@ pub(super) struct Board {
     pub fit: Fit,
     /// Blur of the edges, 1σ \[px\]; of corners near where they were expected.
     pub blur_px: Option<f64>,
-    /// Whether the square between the first four corners is dark; of a whole board.
+    /// Whether the square between the first four corners is dark; only for a whole board.
     pub first_dark: Option<bool>,
 }
 
-/// What is expected of an image.
+/// Expected contents of an image.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Expected {
     pub camera_from_target: Isometry3<f64>,
-    /// How far corners may be from there \[px\].
+    /// Largest distance of corners from there \[px\].
     pub radius_px: f64,
     pub blur_px: f64,
     /// Whether the square between the first four corners is dark.
     pub first_dark: bool,
 }
 
-/// What is looked for and through what.
+/// The target, and the camera that sees it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Eye<'a> {
     pub image: &'a GrayImage,
@@ -176,14 +176,14 @@ impl Eye<'_> {
         Some(Board { fit: self.better_of_both(&seen, fit), blur_px, first_dark: None })
     }
 
-    /// By all sides of the squares, where the image has hard edges: a profile of edges does not fit them.
+    /// The board by all sides of the squares, where the image has hard edges: a profile of edges does not fit them.
     fn on_hard_edges(&self, rough: &Isometry3<f64>) -> Option<Board> {
         let place = |index: usize| Some(Corner::new(index, self.camera.project(&(rough * self.drawn(index))).ok()?));
         let places: Option<Vec<Corner>> = (0..self.grid().len()).map(place).collect();
         self.fitted(&on_hard_edges(self.image, &places?, &self.grid())?, rough, None)
     }
 
-    /// Each corner for itself.
+    /// Each corner separately.
     fn on_soft_edges(&self, rough: &Isometry3<f64>, expected: &Expected) -> Option<Board> {
         let mut found: Vec<(usize, corner::Found)> = self
             .places(rough, expected.first_dark)
@@ -197,7 +197,7 @@ impl Eye<'_> {
         self.fitted(&corners, rough, blur_px)
     }
 
-    /// What corners are seen through.
+    /// The corners with their camera.
     fn seen(&self) -> ViewInput<'_> {
         ViewInput {
             intrinsics: self.camera,
@@ -209,7 +209,7 @@ impl Eye<'_> {
         }
     }
 
-    /// The mirrored pose, when the corners speak clearly for it.
+    /// The mirrored pose, when the corners clearly support it.
     fn better_of_both(&self, seen: &ViewInput<'_>, fit: Fit) -> Fit {
         let Some(other) = pose::other_minimum(seen, &fit, &self.target.centre()) else { return fit };
         let freedom = (2 * fit.corners.len()).saturating_sub(6).max(1) as f64;
@@ -217,8 +217,8 @@ impl Eye<'_> {
         if fit.cost - other.cost > MIRRORED_BETTER * variance { other } else { fit }
     }
 
-    /// Whether corners of all four sides of the board are seen, more than chance has beyond it: then it is not seen shifted by
-    /// whole squares, which would leave the corners of a side where there are none.
+    /// Whether corners of all four sides of the board are seen, more than occur by chance beyond it: then it is not seen
+    /// shifted by whole squares, which would leave the corners of a side where there are none.
     pub fn shows_all_sides(&self, corners: &[Corner]) -> bool {
         let Grid { columns, rows, .. } = self.grid();
         let is_seen =
@@ -241,7 +241,7 @@ impl Eye<'_> {
             .is_some()
     }
 
-    /// Whether [`Self::anywhere`] has a chance.
+    /// Whether [`Self::anywhere`] may succeed.
     pub fn may_show_all(&self) -> bool {
         match self.target {
             TargetSpec::Chessboard(grid) => glance::may_show(self.image, grid.len()),
@@ -258,7 +258,7 @@ impl Eye<'_> {
         {
             self.number_like(expected, &mut corners);
         }
-        // Corners that fix no pose are no board.
+        // Corners that do not determine a pose are not a board.
         let Ok(solved) = planar_pose::solve(&corners, self.target, self.camera) else { return Ok(None) };
         let turned = |pose: &Isometry3<f64>| expected.map_or(0.0, |e| e.rotation.angle_to(&pose.rotation));
         let best = *solved.best.camera_from_target.isometry();

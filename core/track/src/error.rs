@@ -10,7 +10,7 @@ pub enum TrackError {
     /// The intrinsics cannot be computed with.
     #[error("the intrinsics of the calibration are not usable: {source}; calibrate the camera again")]
     Intrinsics {
-        /// What is wrong with them.
+        /// What is wrong with the intrinsics.
         source: CameraError,
     },
     /// The hand-eye transform cannot be computed with.
@@ -30,10 +30,10 @@ pub enum TrackError {
         /// Its value \[m\].
         square_m: f64,
     },
-    /// A number of the motion model is none.
+    /// A number of the motion model is invalid.
     #[error("the motion model's {name} is {value}: it must be finite and positive")]
     BadMotion {
-        /// Which one.
+        /// The number.
         name: &'static str,
         /// The number that was given.
         value: f64,
@@ -62,9 +62,9 @@ pub enum TrackError {
         width: u32,
         /// Height \[px\].
         height: u32,
-        /// Width that the intrinsics say \[px\].
+        /// Width by the intrinsics \[px\].
         camera_width: u32,
-        /// Height that the intrinsics say \[px\].
+        /// Height by the intrinsics \[px\].
         camera_height: u32,
     },
     /// The search for the board failed.

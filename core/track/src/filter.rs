@@ -1,4 +1,4 @@
-//! A Kalman filter for a rigid body whose velocity is constant but for white noise in its acceleration.
+//! A Kalman filter for a rigid body whose velocity is constant except for white noise in its acceleration.
 //!
 //! The state is the board's centre `p`, its orientation `R` (`base_from_target`), its velocity `v` and its angular
 //! velocity `ω`, all in base axes; the covariance is that of the error `[δp δθ δv δω]` with `p + δp`, `Exp(δθ) R`,
@@ -21,9 +21,9 @@ const GATE: f64 = 27.86;
 /// Standard deviation of a board's velocity [m/s] and angular velocity [rad/s] before any motion is seen: a brisk hand.
 const START_SIGMA: (f64, f64) = (0.5, 2.0);
 /// Steps of prediction turn by no more than this [rad]: within them the noise of the turn is taken as not turning
-/// itself, which is off by the square of a third of it.
+/// itself, with an error of the square of a third of it.
 const STEP_RAD: f64 = 0.1;
-/// Steps of prediction at the most; only a time or a spin beyond all reason needs more.
+/// Most steps of prediction; only an unreasonable time or spin needs more.
 const MAX_STEPS: f64 = 1000.0;
 
 type Matrix12 = SMatrix<f64, 12, 12>;
@@ -33,7 +33,7 @@ type Matrix12 = SMatrix<f64, 12, 12>;
 pub(super) struct BoardPose {
     centre: Vector3<f64>,
     rotation: UnitQuaternion<f64>,
-    /// Of `[δp δθ]`.
+    /// Covariance of `[δp δθ]`.
     covariance: Matrix6<f64>,
 }
 
@@ -129,7 +129,7 @@ impl Filter {
         self.rotation.renormalize();
     }
 
-    /// What `sight` says at the filter's time less what is expected, and the covariance of that difference.
+    /// The innovation: `sight` at the filter's time minus the prediction, and the covariance of that difference.
     fn innovation(&self, sight: &BoardPose) -> (Vector6<f64>, Matrix6<f64>) {
         let turn = se3::rotation_vector(&(sight.rotation * self.rotation.inverse()));
         let shift = sight.centre - self.centre;

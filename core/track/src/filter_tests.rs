@@ -15,7 +15,7 @@ fn centre() -> Point3<f64> {
     Point3::new(0.0675, 0.045, 0.0)
 }
 
-/// A board that moves as the model says, in steps much finer than the images.
+/// A board that moves according to the model, in steps much finer than the images.
 struct Board {
     at: Vector3<f64>,
     rotation: UnitQuaternion<f64>,
@@ -42,7 +42,7 @@ impl Board {
         Pose::from_isometry(Isometry3::from_parts(origin.into(), self.rotation))
     }
 
-    /// As an image would see it: sideways to 0.1 mm, in depth to 0.5 mm, tilted to 2 mrad.
+    /// The board as measured by an image: sideways to 0.1 mm, in depth to 0.5 mm, tilted to 2 mrad.
     fn seen(&self, rng: &mut ChaCha8Rng) -> BoardPose {
         let sigmas = [1e-4, 1e-4, 5e-4, 2e-3, 2e-3, 3e-4];
         let delta = Vector6::from_fn(|i, _| {

@@ -86,7 +86,7 @@ impl<'a> Ring<'a> {
                 let here = responses[i];
                 let around = [i - columns - 1, i - columns, i - columns + 1, i - 1];
                 let after = [i + 1, i + columns - 1, i + columns, i + columns + 1];
-                // Of equal neighbours the first counts.
+                // The first of equal neighbours counts.
                 if here >= least
                     && around.iter().all(|j| responses[*j] < here)
                     && after.iter().all(|j| responses[*j] <= here)

@@ -1,4 +1,4 @@
-//! Where the tip has to be, so that the camera keeps its view of the board or the tip stays at a corner.
+//! Pose of the tip for which the camera keeps its view of the board or the tip stays at a corner.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
@@ -15,11 +15,11 @@ pub enum Keep {
     View(Pose<Camera, Target>),
     /// The tip in front of a corner.
     Corner {
-        /// Which one: index into the target's points.
+        /// Index into the target's points.
         index: usize,
-        /// How far in front of it \[m\], along the board's normal towards the viewer.
+        /// Distance in front of it \[m\], along the board's normal towards the viewer.
         stand_off_m: f64,
-        /// How the tip is turned, in the base.
+        /// Orientation of the tip in the base.
         base_from_tip_orientation: UnitQuaternion<f64>,
     },
 }
@@ -39,8 +39,8 @@ impl Keep {
     /// The tip by which this is kept, for a camera on the tip. Its velocities are those of a body rigidly attached to
     /// the board; the tip in front of a corner goes along with the corner and does not turn.
     ///
-    /// `None` for a camera beside the robot (the board is then on the tip, or its view does not depend on the tip), for
-    /// a corner that the board does not have, and for numbers that are not finite.
+    /// `None` for a camera next to the robot (eye to hand) (the board is then on the tip, or its view does not depend
+    /// on the tip), for a corner that the board does not have, and for numbers that are not finite.
     pub fn tip_goal(&self, estimate: &Estimate, calibrated: &Predictor, target: &TargetSpec) -> Option<TipGoal> {
         let HandEye::EyeInHand { tip_from_camera, .. } = calibrated.hand_eye else { return None };
         let goal = match *self {

@@ -18,7 +18,7 @@ fn target() -> TargetSpec {
     TargetSpec::Chessboard(GRID)
 }
 
-/// Where the board is `t` later: its origin and its axes go on evenly.
+/// Pose of the board `t` later: its origin and its axes go on evenly.
 fn later(estimate: &Estimate, t: f64) -> Pose<Base, Target> {
     let turn = UnitQuaternion::from_scaled_axis(estimate.angular_velocity_rad_s * t);
     let origin = estimate.base_from_target.translation() + estimate.velocity_m_s * t;

@@ -62,25 +62,25 @@ pub use goal::{Keep, TipGoal};
 pub use rest::Rest;
 pub use tracker::Tracker;
 
-/// What a tracker works with.
+/// Input of a tracker.
 #[derive(Debug, Clone)]
 pub struct Setup {
     /// The board.
     pub target: TargetSpec,
     /// Camera and hand-eye, with their uncertainty where it is known.
     pub calibrated: Predictor,
-    /// How the board may move.
+    /// Motion model of the board.
     pub motion: MotionModel,
 }
 
-/// The board's velocity is constant but for white noise in its acceleration, of these densities.
+/// The board's velocity is constant except for white noise in its acceleration, of these densities.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionModel {
-    /// Of the acceleration of its centre [m/s²/√Hz].
+    /// Density for the acceleration of its centre [m/s²/√Hz].
     pub acceleration: f64,
-    /// Of its angular acceleration [rad/s²/√Hz].
+    /// Density for its angular acceleration [rad/s²/√Hz].
     pub angular_acceleration: f64,
-    /// How long \[s\] the board is assumed to go on as it went while it is not seen; after that it is lost.
+    /// How long \[s\] the board is assumed to keep its velocity while it is not seen; after that it is lost.
     pub coast_s: f64,
 }
 
@@ -93,7 +93,7 @@ pub struct Image<'a> {
     pub grey: &'a GrayImage,
     /// Depth of the same instant and the same camera, where there is one.
     pub depth: Option<&'a DepthImage>,
-    /// Depths there and beyond are no surface \[m\].
+    /// Depths there and beyond are not a surface \[m\].
     pub far_plane_m: f32,
     /// The tip at the same instant.
     pub base_from_tip: Pose<Base, Tip>,
@@ -138,8 +138,7 @@ pub struct BoardDetection {
     pub rms_px: f64,
 }
 
-/// The board in one image by its corners and by how its depths say that it is tilted. Where the board is and how far away is
-/// told by the corners alone.
+/// The board in one image by its corners, with the tilt from its depths. Position and distance are from the corners alone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WithDepth {
     /// The board in the base.
@@ -162,7 +161,7 @@ pub struct ByDepth {
     pub rms_m: f64,
 }
 
-/// Where the board is by all images so far.
+/// Pose of the board by all images so far.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
     /// For this time \[s\].
@@ -179,8 +178,8 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// The same board at another time, going on as it goes. The covariance stays that of its own time; the tracker
-    /// ([`Tracker::at`]) knows how it grows.
+    /// The same board at another time, going on as it goes. The covariance is not propagated; [`Tracker::at`] does
+    /// that.
     #[must_use]
     pub fn carried_to(&self, time_s: f64) -> Self {
         let after_s = time_s - self.time_s;
@@ -191,7 +190,7 @@ impl Estimate {
     }
 }
 
-/// What an image has brought.
+/// Result of an image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Update {
     /// Time of the image \[s\].
@@ -200,7 +199,8 @@ pub struct Update {
     pub state: State,
     /// This image alone.
     pub seen: Option<BoardDetection>,
-    /// This image alone, with the tilt by its depths: what the filter takes in; `None` where the depths tell none.
+    /// This image alone, with the tilt by its depths: what the filter takes in; `None` where the depths do not
+    /// determine it.
     pub with_depth: Option<WithDepth>,
     /// The depths of this image alone.
     pub by_depth: Option<ByDepth>,

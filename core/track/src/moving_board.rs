@@ -67,7 +67,7 @@ impl Watch {
         *(base_from_camera.inverse() * *base_from_target).isometry()
     }
 
-    /// The next image, with the board there or with none.
+    /// The next image, with the board at this pose or without a board.
     pub(crate) fn see(&mut self, board: Option<&Pose<Base, Target>>) -> Update {
         let board = board.map(|b| self.camera_from_target(b));
         let grey = self.stage.image(board.as_ref(), self.seed);

@@ -1,11 +1,11 @@
-//! How far corners are off, as far as the images tell.
+//! Noise of corners, as far as the images show it.
 
 /// Part of what is known that the next image leaves: some ten images count.
 const FORGET: f64 = 0.9;
 /// Least noise of a corner [px]: the grey levels are whole numbers.
 const MIN_SIGMA_PX: f64 = 0.005;
-/// An image whose corners are off by more than the calibration states is believed, when chance would do so less than
-/// once in ten thousand images.
+/// Larger errors of an image's corners than the calibration states are accepted as real when they would occur by chance
+/// in less than one of ten thousand images.
 const QUANTILE: f64 = 3.72;
 
 /// The variance of one coordinate of a corner: as the calibration states it, or else from the residuals of the last
@@ -27,8 +27,8 @@ impl CornerNoise {
         (self.cost_px2, self.freedom) = (0.0, 0.0);
     }
 
-    /// Takes the residuals of an image in (`cost_px2` the sum of their squares over `corners`), and says what variance
-    /// \[px²\] its corners have.
+    /// Takes the residuals of an image in (`cost_px2` the sum of their squares over `corners`), and returns the
+    /// variance \[px²\] of its corners.
     pub fn variance(&mut self, cost_px2: f64, corners: usize) -> f64 {
         let freedom = (2.0 * corners as f64 - 6.0).max(1.0);
         self.cost_px2 = FORGET * self.cost_px2 + cost_px2;
@@ -40,7 +40,7 @@ impl CornerNoise {
     }
 }
 
-/// What chi-square over its degrees of freedom hardly ever exceeds. Wilson & Hilferty 1931.
+/// Value that chi-square over its degrees of freedom hardly ever exceeds. Wilson & Hilferty 1931.
 fn ratio_by_chance(freedom: f64) -> f64 {
     let part = 2.0 / (9.0 * freedom);
     (1.0 - part + QUANTILE * part.sqrt()).powi(3)

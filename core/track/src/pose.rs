@@ -18,8 +18,8 @@ const INLIER: f64 = 4.5;
 const MEDIAN_LENGTH: f64 = 1.1774;
 const ROBUST_STEPS: usize = 10;
 const PLAIN_STEPS: usize = 10;
-/// A step whose rotation \[rad\] and translation [part of the distance] are below this ends the robust fit: what is left
-/// moves no corner across the limit.
+/// A step whose rotation \[rad\] and translation [part of the distance] are below this ends the robust fit: the
+/// remaining error moves no corner across the limit.
 const CONVERGED: f64 = 1e-4;
 /// Minima closer than this angle \[rad\] are one.
 const SAME_POSE_RAD: f64 = 0.01;
@@ -28,11 +28,11 @@ const SAME_POSE_RAD: f64 = 0.01;
 #[derive(Debug, Clone)]
 pub(super) struct Fit {
     pub pose: Isometry3<f64>,
-    /// Those of the corners given that are the board's.
+    /// The given corners that belong to the board.
     pub corners: Corners,
     /// JᵀJ of these, weighed by what their detector states, by the right perturbation `[t; r]` [px²/m² and px²/rad²].
     pub information: Matrix6<f64>,
-    /// Sum of their squared residuals, weighed likewise \[px²\].
+    /// Sum of their squared residuals, with the same weights \[px²\].
     pub cost: f64,
 }
 
@@ -42,7 +42,7 @@ impl Fit {
     }
 }
 
-/// How far the corners are from where the pose has them \[px\]; `None` when one has no image there.
+/// Reprojection error of each corner \[px\]; `None` when one has no image there.
 fn lengths(seen: &ViewInput<'_>, pose: &Isometry3<f64>) -> Option<Vec<f64>> {
     let length = |corner: &Corner| {
         let point = pose * seen.board.point(corner.index, seen.shape);
@@ -55,9 +55,9 @@ fn sigma_of(lengths: &[f64]) -> f64 {
     median_high(lengths.iter().copied()).map_or(0.0, |median| median / MEDIAN_LENGTH)
 }
 
-/// Least squares in which points that do not fit lose their weight, then plain least squares over those that fit.
-/// `floor_px` is a standard deviation that is expected of good points in any case. `None` when it does not converge. `seen` is what
-/// the corners are seen through.
+/// Least squares in which points that do not fit lose their weight, then plain least squares over those that fit. `floor_px` is a
+/// standard deviation that is expected of good points in any case. `None` when it does not converge. `seen` is the camera and the
+/// target of the corners.
 pub(super) fn robust(seen: &ViewInput<'_>, corners: &Corners, start: &Isometry3<f64>, floor_px: f64) -> Option<Fit> {
     let seen = &ViewInput { corners, ..*seen };
     let mut pose = *start;
@@ -92,14 +92,14 @@ fn plain(seen: &ViewInput<'_>, start: &Isometry3<f64>, corners: Corners) -> Opti
     Some(Fit { pose, corners, information, cost: squared_px })
 }
 
-/// The other minimum that a flat board has: its normal mirrored at the line of sight to `centre`, refined. `None` when
+/// The other minimum that a flat board has: its normal reflected in the line of sight to `centre`, refined. `None` when
 /// there is none.
 pub(super) fn other_minimum(seen: &ViewInput<'_>, fit: &Fit, centre: &Point3<f64>) -> Option<Fit> {
     let other = plain(seen, &mirrored(&fit.pose, &centre.coords)?, fit.corners.clone())?;
     (other.pose.rotation.angle_to(&fit.pose.rotation) > SAME_POSE_RAD).then_some(other)
 }
 
-/// Whether points of the board span enough of it to fix a pose: a deviation of `least_m` along its narrow side.
+/// Whether points of the board span enough of it to determine a pose: a deviation of `least_m` along its narrow side.
 pub(super) fn spans(points: impl Iterator<Item = Point3<f64>> + Clone, least_m: f64) -> bool {
     let count = points.clone().count() as f64;
     if count < 4.0 {

@@ -1,9 +1,9 @@
-//! Whether the board rests, so that an arm that follows it rests as well.
+//! Whether the board is at rest, so that an arm that follows it is at rest as well.
 //!
-//! Where the board is put differs from image to image by more than the board moves, and most of all when the arm moves: an
-//! arm that follows every difference moves by its own errors. So a board rests where it is until an image puts it somewhere
-//! else by more than two images of one and the same place differ by chance; and one that moved rests again once it has
-//! gone no farther than that for a while.
+//! The estimated pose of the board differs from image to image by more than the board moves, most of all when the arm
+//! moves: an arm that follows every difference moves by its own errors. So a board stays at rest until an image differs
+//! from its pose by more than two images of the same pose differ by chance; and one that moved is at rest again once it has
+//! moved no farther than that for a while.
 
 use std::collections::VecDeque;
 
@@ -17,15 +17,15 @@ use handeye_geometry::se3;
 const MOVED: f64 = 22.46;
 /// And in one of twenty.
 const NEAR: f64 = 12.59;
-/// For so long \[s\] a board has to have stayed near one place to rest there: one that goes on by a standard deviation in
-/// this time is followed as well by steps.
+/// How long \[s\] a board has to stay near one place to be at rest there: one that moves by less than a standard
+/// deviation in this time can as well be followed in steps.
 const STAYS_S: f64 = 0.5;
 
-/// Whether the board rests, and where.
+/// Whether the board is at rest, and where.
 #[derive(Debug, Clone, Default)]
 pub struct Rest {
     at: Option<Estimate>,
-    /// Of the last [`STAYS_S`].
+    /// Estimates of the last [`STAYS_S`].
     before: VecDeque<Estimate>,
 }
 
@@ -55,13 +55,13 @@ impl Rest {
         }
     }
 
-    /// Where the board rests; `None` while it moves, and before that is known.
+    /// Pose of the board at rest; `None` while it moves, and before that is known.
     pub fn at(&self) -> Option<&Estimate> {
         self.at.as_ref()
     }
 }
 
-/// How far two estimates are apart in standard deviations of the difference of two images, squared.
+/// Squared distance of two estimates in standard deviations of the difference of two images.
 fn apart_squared(a: &Estimate, b: &Estimate, of_image: &Matrix6<f64>) -> f64 {
     let way = se3::log((a.base_from_target.inverse() * b.base_from_target).isometry());
     (of_image * 2.0).cholesky().map_or(f64::INFINITY, |factor| way.dot(&factor.solve(&way)))

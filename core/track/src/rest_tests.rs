@@ -36,8 +36,8 @@ fn placed(metres: f64, noise: &Vector6<f64>) -> Pose<Base, Target> {
     Pose::from_isometry(se3::exp(&Vector6::new(metres, 0.0, 0.0, 0.0, 0.0, 0.0)) * se3::exp(noise))
 }
 
-/// Images in which the board is at `place` by time, with errors that are those of chance; in how many it rests, and how many
-/// places it rested at.
+/// Images in which the board is at `place` by time, with random errors; in how many it is at rest, and at how many places it
+/// was.
 fn shown(seconds: f64, seed: u64, place: impl Fn(f64) -> f64) -> (Vec<bool>, usize) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut rest = Rest::default();

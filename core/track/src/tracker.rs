@@ -26,7 +26,7 @@ const USUAL_BLUR_PX: f64 = 0.8;
 
 /// Follows a board. One image after the other goes in, and where the board is comes out.
 ///
-/// Every image is taken by itself first: corners near where the board is expected, or the whole image searched for the
+/// Every image is evaluated alone first: corners near where the board is expected, or the whole image searched for the
 /// whole board where nothing is expected or nothing was found there; then a pose with its covariance. A filter for
 /// constant velocity joins the images. The mathematics is in `docs/maths/tracking.md`.
 #[derive(Debug, Clone)]
@@ -80,7 +80,7 @@ impl Tracker {
         })
     }
 
-    /// What it works with.
+    /// Its input.
     pub fn setup(&self) -> &Setup {
         &self.setup
     }
@@ -100,7 +100,7 @@ impl Tracker {
     /// Takes an image in. An image of the same time as the one before changes nothing and gets the same answer; an
     /// earlier one starts the tracker again.
     ///
-    /// A board that is not in the image is no error: [`Update::state`] says so.
+    /// A board that is not in the image is not an error: [`Update::state`] reports it.
     ///
     /// # Errors
     /// [`TrackError::OtherSize`], [`TrackError::NotFinite`], [`TrackError::BadTime`], which leave the tracker as it was;
@@ -141,8 +141,8 @@ impl Tracker {
         Ok(update)
     }
 
-    /// Where the board will be at `time_s` if it goes on as it went, and how sure that is; `None` while nothing is known
-    /// of it, for a time before the last image, and for one for which it would be lost.
+    /// Predicted pose of the board at `time_s` at constant velocity, with its covariance; `None` while it is not known,
+    /// for a time before the last image, and for one for which it would be lost.
     pub fn at(&self, time_s: f64) -> Option<Estimate> {
         let known_s = self.filter.as_ref()?.time_s();
         (time_s >= known_s).then(|| self.expected(time_s))?.map(|filter| filter.estimate())
@@ -252,7 +252,7 @@ impl Tracker {
         usable.then_some(WithDepth { base_from_target, covariance })
     }
 
-    /// Whether a sight is taken for the board; the filter then has it, with the tilt by depth where there is one.
+    /// Whether a detection is accepted as the board; the filter then has it, with the tilt by depth where there is one.
     fn believe(&mut self, time_s: f64, seen: &BoardDetection, tilted: Option<&WithDepth>) -> bool {
         let centre = self.setup.target.centre();
         let sight = match tilted {

@@ -175,7 +175,7 @@ fn one_wild_image_does_not_move_the_estimate() {
 
 #[test]
 fn a_board_that_is_moved_suddenly_is_found_again_within_three_images() {
-    // Also by whole squares, where the pattern looks the same but for its ends.
+    // Also by whole squares, where the pattern looks the same except for its ends.
     let turned = still().rotation() * Vector3::new(2.0 * GRID.square_m, 0.0, 0.0);
     let by_squares = Isometry3::translation(turned.x, turned.y, turned.z) * still().isometry();
     for there in [board_at(Vector3::new(-0.05, 0.03, 0.0), Vector3::zeros()), Pose::from_isometry(by_squares)] {
@@ -340,7 +340,7 @@ fn corners_that_are_hidden_stay_unseen_where_edges_are_hard() {
         let levels = image.pixels().map(|pixel| pixel.0[0]);
         let (dark, light) = levels.fold((255, 0), |(dark, light): (u8, u8), level| (dark.min(level), light.max(level)));
         let middle = dark / 2 + light / 2;
-        // A pixel of which most is dark is one whose centre is.
+        // A pixel is mostly dark where its centre is.
         image.pixels_mut().for_each(|pixel| pixel.0[0] = if pixel.0[0] < middle { dark } else { light });
         let is_covered = i >= 4;
         let back = in_camera.inverse();
@@ -371,7 +371,7 @@ mod slow {
 
     #[test]
     fn the_covariance_of_one_image_is_that_of_its_errors() {
-        // Squared errors over what the covariance expects, of 6 degrees of freedom each: in 99.9 of 100 cases the mean of n
+        // Squared errors normalised by the covariance, of 6 degrees of freedom each: in 99.9 of 100 cases the mean of n
         // lies within 6 (1 ± 3.29 √(2 / 6n)); corners are a little correlated by the grey levels' steps, hence 10 % more.
         let mut total = 0.0;
         let count = 60;

@@ -1,8 +1,8 @@
 //! Sentences with values in them, which can be reported in any language.
 //!
 //! The English sentence is the template. `text!("{n} degrees of freedom", n = 12)` makes a [`Text`] that can be kept, sent
-//! between threads and logged; whoever shows it has a [`Catalogue`]. What a library or the cell says in its own words
-//! stays as it is.
+//! between threads and logged; the program that shows it has a [`Catalogue`]. Texts of a library or the cell are not
+//! translated.
 //!
 //! Errors are such sentences by `derive(Localized)`: `#[error("…")]` is the template. An error of another library is a value in
 //! one of them.
@@ -30,7 +30,7 @@ pub use handeye_wording_derive::Localized;
 
 /// A language, with the templates in it.
 pub trait Catalogue: Copy {
-    /// That of an English one, with the same values; `None` where there is none, and for English.
+    /// The translation of an English sentence, with the same values; `None` where there is none, and for English.
     fn translation(self, english: &str) -> Option<&'static str>;
 }
 
@@ -44,7 +44,7 @@ impl Catalogue for English {
     }
 }
 
-/// Decimals that a number is shown with: so many at the least, and as many as a figure that is no zero takes.
+/// Decimals that a number is shown with: at least `least`, and enough for one digit that is not zero.
 pub fn decimals(value: f64, least: usize) -> usize {
     /// Beyond it is the rounding of what was computed.
     const MOST: usize = 9;
@@ -57,7 +57,7 @@ pub fn shown(value: f64, least: usize) -> String {
     format!("{value:.*}", decimals(value, least))
 }
 
-/// What another library says, on one line.
+/// The error text of another library, on one line.
 pub fn foreign(error: &dyn fmt::Display) -> Text {
     Text::verbatim(one_line(error))
 }
@@ -73,12 +73,12 @@ pub struct Text {
     english: Cow<'static, str>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     values: Vec<(Cow<'static, str>, Value)>,
-    /// Whether somebody else's words stand here, which are not looked up.
+    /// Whether it is the text of another program, which is not translated.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     verbatim: bool,
 }
 
-/// What stands for a `{name}` in a sentence.
+/// Value of a `{name}` in a sentence.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Value {
     /// The same in every language.
@@ -87,7 +87,8 @@ pub enum Value {
     Text(Text),
 }
 
-/// What is the same in every language. No error of ours is among these: it is a sentence, which its package translates.
+/// Values that are the same in every language. Our own errors are not among these: they are sentences, which their
+/// package translates.
 #[macro_export]
 macro_rules! plain_values {
     ($($of:ty),* $(,)?) => {$(
@@ -125,7 +126,7 @@ impl Value {
         if words.contains(' ') { Self::Text(Text::new(words, Vec::new())) } else { Self::Plain(words.to_owned()) }
     }
 
-    /// It by itself, in a language.
+    /// The text alone, in a language.
     pub fn in_language(&self, language: impl Catalogue) -> String {
         match self {
             Self::Plain(plain) => plain.clone(),
@@ -158,7 +159,7 @@ impl Text {
         Self { english: Cow::Owned(words.into()), values: Vec::new(), verbatim: true }
     }
 
-    /// The words, where they are somebody else's ([`Text::verbatim`]).
+    /// The text, where it is from another program ([`Text::verbatim`]).
     pub fn foreign_words(&self) -> Option<&str> {
         self.verbatim.then_some(&*self.english)
     }
@@ -170,7 +171,7 @@ impl Text {
         self
     }
 
-    /// Sentences one after the other.
+    /// Consecutive sentences.
     pub fn sentences(all: impl IntoIterator<Item = Self>) -> Self {
         let joined = all.into_iter().reduce(|first, next| text!("{first} {next}", first = first, next = next));
         joined.unwrap_or_default()
@@ -210,7 +211,7 @@ impl Text {
         reported
     }
 
-    /// Whether there is nothing to say.
+    /// Whether the text is empty.
     pub fn is_empty(&self) -> bool {
         self.english.is_empty()
     }
@@ -218,7 +219,7 @@ impl Text {
     /// The English sentence, for fields of documents.
     ///
     /// # Errors
-    /// Those of the serializer.
+    /// Errors of the serializer.
     pub fn serialize_english<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(&self.in_language(English))
     }

@@ -35,8 +35,8 @@ const fn tube(link: usize, from: [f64; 3], to: [f64; 3], radius: f64) -> Part {
     Part { link, from, to, radius, round: true, colour: ALUMINIUM }
 }
 
-/// Joint axes at zero: J1 up at x = 0; J2, J3, J4 along -x at z = 0.07455, 0.49965, 0.8918; J5 up at x = -0.110;
-/// J6 along -x at z = 0.98655. The arm's tubes stand beside the plane of the axes as on the real machine.
+/// Joint axes at zero: J1 up at x = 0; J2, J3, J4 along -x at z = 0.07455, 0.49965, 0.8918; J5 up at x = -0.110; J6
+/// along -x at z = 0.98655. The arm's tubes are offset from the plane of the axes as on the real machine.
 const PARTS: [Part; 19] = [
     housing(0, [0.0, 0.0, -0.01465], [0.0, 0.0, 0.008], 0.075, GRAPHITE),
     housing(0, [0.0, 0.0, 0.008], [0.0, 0.0, 0.022], 0.064, ALUMINIUM),

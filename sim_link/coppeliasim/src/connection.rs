@@ -27,10 +27,10 @@ const SLICE: Duration = Duration::from_millis(20);
 /// A client of one server. Belongs to one thread at a time: it can be sent to another, not shared.
 ///
 /// A call that ends without a reply (time out, lost connection, cancelled, nonsense) closes the socket, so that the next
-/// call starts on a new one. The client id stays, and with it the server's record of this client (stepping mode,
-/// locks); unless the server was left in the middle of a conversation, waiting for this client and perhaps holding the
+/// call starts on a new one. The client id stays, and with it the server's record of this client (stepping mode, locks);
+/// unless the server was left in the middle of a conversation, waiting for this client and perhaps holding the
 /// simulation, or the call was cancelled or ran past its total time: then the record is ended and a new id taken.
-/// [`Connection::epoch`] tells when state on the server may have been lost.
+/// [`Connection::epoch`] shows when state on the server may have been lost.
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub struct Connection {
     transport: Box<dyn Transport>,
@@ -104,18 +104,18 @@ impl Connection {
         }
     }
 
-    /// Where the server is.
+    /// Address of the server.
     pub(crate) fn endpoint(&self) -> &Endpoint {
         &self.endpoint
     }
 
-    /// Longest duration of a call that has no limit of its own.
+    /// Longest duration of a call without its own limit.
     pub(crate) fn total_timeout(&self) -> Duration {
         self.options.total_timeout
     }
 
-    /// Whether the server is there, as far as is known without asking it: after a call that was answered, `false` means
-    /// that it has gone since.
+    /// Whether the server is connected, as far as is known without a request: after a call that was answered, `false`
+    /// means that it has gone since.
     pub fn is_connected(&mut self) -> bool {
         self.transport.connected()
     }
@@ -125,7 +125,7 @@ impl Connection {
         self.options.is_own_cell
     }
 
-    /// What it means that the conversation broke off in a call.
+    /// The error for a conversation that broke off in a call.
     pub(super) fn broken_off(&self, call: &str) -> LinkError {
         let (call, after) = (call.to_owned(), self.options.reply_timeout);
         if self.options.is_own_cell {
@@ -148,12 +148,12 @@ impl Connection {
     /// Calls a function of the server by its dotted name, with the connection's time limits.
     ///
     /// # Errors
-    /// Any [`LinkError`] of a conversation; [`LinkError::Remote`] when the server says no.
+    /// Any [`LinkError`] of a conversation; [`LinkError::Remote`] when the server refuses.
     pub fn call(&mut self, func: &str, args: Vec<Value>) -> Result<Returned, LinkError> {
         self.call_with(func, args, &CallOptions::default())
     }
 
-    /// [`Connection::call`] with limits of its own.
+    /// [`Connection::call`] with separate limits.
     ///
     /// # Errors
     /// As [`Connection::call`].
@@ -197,7 +197,7 @@ impl Connection {
     /// A call from its request to its result.
     ///
     /// Servers after CoppeliaSim 4.10 know names of the module only once some client has had it loaded, and forget that
-    /// when they are started again. So a name that is not known is asked for once more with the module loaded.
+    /// when they are started again. So a name that is not known is called again with the module loaded.
     fn converse(&mut self, exchange: &mut Exchange<'_>, args: Vec<Value>) -> Result<Vec<Value>, LinkError> {
         let mut message = self.request(exchange.func, args);
         // The request, to be sent again with the module loaded.
@@ -207,7 +207,7 @@ impl Connection {
             let reply = self.exchange(exchange, &message)?;
             let is_answer = matches!(reply, ServerMessage::Returned { .. } | ServerMessage::Failed { .. });
             if is_answer && let Some(original) = loading.take() {
-                // Whether it could be loaded is for the call itself to say.
+                // Whether it could be loaded is shown by the call itself.
                 self.loaded = true;
                 message = original;
                 continue;
@@ -221,7 +221,7 @@ impl Connection {
                     loading = unloaded.take();
                     message = self.request(REQUIRE, vec![Value::from(MODULE)]);
                 }
-                // What a server says that does not know what it was asked to go on with.
+                // The reply of a server that does not know the call that it was asked to continue.
                 ServerMessage::Failed { message: text } if exchange.asked && text.contains(EXECUTED) => {
                     return Err(LinkError::Forgotten { call: exchange.func.to_owned() });
                 }
@@ -264,7 +264,7 @@ impl Connection {
         loop {
             self.check_limits(exchange, true)?;
             let waited = sent.elapsed();
-            // A call may be allowed a long silence, but that is of a server, not of nobody.
+            // A call may allow a long silence of a connected server, but not a lost connection.
             let connected = self.transport.connected();
             let limit =
                 if connected { exchange.reply_timeout } else { exchange.reply_timeout.min(self.options.reply_timeout) };
@@ -285,7 +285,7 @@ impl Connection {
         }
     }
 
-    /// Ends the call when it is cancelled or too long; `under_way` says whether the server knows of it.
+    /// Ends the call when it is cancelled or too long; `under_way`: whether the server knows of it.
     fn check_limits(&mut self, exchange: &Exchange<'_>, under_way: bool) -> Result<(), LinkError> {
         let cancelled = exchange.is_cancelled() || self.options.shutdown.is_cancelled();
         let elapsed = exchange.started.elapsed();
@@ -298,7 +298,7 @@ impl Connection {
             self.late(exchange, elapsed)
         };
         if under_way {
-            // The server may still be busy with the call, a motion say: with this client's record, the call ends.
+            // The server may still be busy with the call, for example a motion: it ends with this client's record.
             self.renew();
         }
         Err(error)

@@ -221,7 +221,7 @@ fn nonsense_is_named_and_the_next_call_works() {
     connection.call("sim.x", vec![]).expect("the next call works");
 }
 
-/// What CoppeliaSim 4.2 to 4.5 answer, whatever was called.
+/// The reply of CoppeliaSim 4.2 to 4.5 to any call.
 #[test]
 fn a_server_of_protocol_1_is_too_old_whether_it_did_what_it_was_asked_or_not() {
     let done = [("success", Value::from(true)), ("ret", Value::Array(vec![Value::from(40_501)]))];

@@ -4,7 +4,7 @@
 pub const HANDLE_WORLD: i64 = -1;
 /// Stands for every object.
 pub const HANDLE_ALL: i64 = -2;
-/// Stands for every object that the simulation handles by itself.
+/// Denotes every object that the simulation handles by itself.
 pub const HANDLE_ALL_EXCEPT_EXPLICIT: i64 = -3;
 /// Stands for the parent of the object as a reference frame.
 pub const HANDLE_PARENT: i64 = -11;

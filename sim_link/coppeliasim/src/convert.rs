@@ -11,21 +11,21 @@ use handeye_geometry::depth::DepthImage;
 use handeye_geometry::frames::Pose;
 use image::RgbImage;
 
-/// How far a rotation may be off (norm of a quaternion, entries of RᵀR) before it is refused. Single precision is
-/// off by 1e-6; a quaternion in another order or scale by far more.
+/// How far a rotation may be inexact (norm of a quaternion, entries of RᵀR) before it is refused. Single precision has
+/// an error of 1e-6; a quaternion in another order or scale by far more.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
 /// Largest image side believed.
 const MAX_SIDE: f64 = 16384.0;
 
-/// A value of the simulator that means nothing.
+/// A value of the simulator that is not valid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum ConvertError {
     /// A number is infinite or not a number.
     #[error("the pose is not finite")]
     NotFinite,
-    /// The rotation part is no rotation.
+    /// The rotation part is not a rotation.
     #[error("the pose has no rotation: it is off by {off_by:.1e}")]
     NotARotation {
         /// Largest deviation from a unit quaternion, or from an orthonormal right-handed matrix.

@@ -1,4 +1,4 @@
-//! Where a server listens.
+//! The address at which a server listens.
 
 use std::fmt;
 use std::str::FromStr;
@@ -10,7 +10,7 @@ pub const DEFAULT_PORT: u16 = 23000;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 #[error("{text:?} is not an address of a server: {reason}; write HOST:PORT, for example 127.0.0.1:23000")]
 pub struct BadEndpoint {
-    /// What was given.
+    /// The text as given.
     pub text: String,
     /// What is wrong with it.
     pub reason: &'static str,
@@ -18,7 +18,8 @@ pub struct BadEndpoint {
 
 /// A TCP address of a remote API server.
 ///
-/// Parses from `tcp://HOST:PORT`, `HOST:PORT` or `HOST` (port [`DEFAULT_PORT`]); an IPv6 address stands in brackets.
+/// Parses from `tcp://HOST:PORT`, `HOST:PORT` or `HOST` (port [`DEFAULT_PORT`]); an IPv6 address is written in
+/// brackets.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Endpoint {
     host: String,

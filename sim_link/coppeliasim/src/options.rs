@@ -1,28 +1,29 @@
-//! How long to wait for what.
+//! Timeouts.
 
 use std::time::Duration;
 
 use handeye_geometry::progress::CancelToken;
 
-/// How a connection behaves unless a call says otherwise.
+/// Options of a connection, unless a call overrides them.
 #[derive(Debug, Clone)]
 pub struct ConnectionOptions {
     /// Longest silence of the server within a call.
     pub reply_timeout: Duration,
     /// Longest duration of a whole call, however lively the server is.
     pub total_timeout: Duration,
-    /// A host that has been silent for so long counts as gone, even if its connection was never closed; `None` relies
+    /// A host that has been silent for this long counts as gone, even if its connection was never closed; `None` relies
     /// on the connection alone.
     pub heartbeat: Option<Duration>,
-    /// After so many seconds without a message the server may forget this client, with its stepping mode and locks: it
-    /// bounds how long a client that crashed can hold the simulation. Longer than any call that holds it, so that
-    /// nothing has to be sent to keep a lock alive, and than a pass of a slow scene.
+    /// After this many seconds without a message the server may forget this client, with its stepping mode and locks:
+    /// it bounds how long a client that crashed can hold the simulation. Longer than any call that holds it, so that
+    /// nothing has to be sent to keep a lock alive, and longer than a pass of a slow scene.
     pub idle_timeout_s: u32,
     /// Seed of the client ids; `None` draws them from the system. Two clients of one server must not share a seed.
     pub seed: Option<u64>,
     /// Ends every wait of this connection, for the end of the program.
     pub shutdown: CancelToken,
-    /// The server is a thread of this process: nobody can start it again, and it is late only where the computer is.
+    /// The server is a thread of this process: the user cannot start it again, and it is late only on a computer under
+    /// load.
     pub is_own_cell: bool,
 }
 
@@ -57,7 +58,8 @@ pub struct CallOptions {
     pub total_timeout: Option<Duration>,
     /// Ends the wait within 50 ms when raised.
     pub cancel: Option<CancelToken>,
-    /// How long a cancelled call may still end by itself: giving it up costs this client its record on the server.
+    /// How long a cancelled call may still take to end by itself: giving it up costs this client its record on the
+    /// server.
     pub grace: Duration,
     /// The call waits for one pass of the simulation, and is given up where another client keeps that from beginning:
     /// [`LinkError::Held`](super::LinkError::Held).
@@ -65,8 +67,8 @@ pub struct CallOptions {
 }
 
 impl CallOptions {
-    /// For a call that may take `total`, in silence: a server that defers its reply says nothing until it is done.
-    /// That it is alive is watched by the connection itself.
+    /// For a call that may take `total` without a message: a server that defers its reply sends nothing until it is
+    /// done. The connection itself checks that the server is alive.
     pub fn long(total: Duration, cancel: &CancelToken) -> Self {
         let total = Some(total);
         Self { reply_timeout: total, total_timeout: total, cancel: Some(cancel.clone()), ..Self::default() }

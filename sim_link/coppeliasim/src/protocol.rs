@@ -1,4 +1,4 @@
-//! Messages of the remote API, version 2 of its protocol: requests to bytes, bytes to what the server says.
+//! Messages of the remote API, version 2 of its protocol: requests to bytes, bytes to messages of the server.
 
 use ciborium::Value;
 use rand::{RngExt as _, SeedableRng as _};
@@ -12,7 +12,7 @@ pub(super) const EXECUTED: &str = "_*executed*_";
 pub(super) const END: &str = "_*end*_";
 /// The server asks to be polled again: it is not done.
 pub(super) const WAIT: &str = "_*wait*_";
-/// The server asks for the last request once more: it could not take it.
+/// The server asks for the last request again: it could not process it.
 pub(super) const REPEAT: &str = "_*repeat*_";
 /// Has the server load a module, so that its functions can be called by name.
 pub(super) const REQUIRE: &str = "zmqRemoteApi.require";
@@ -27,8 +27,8 @@ pub(super) const NO_SUCH_OBJECT: &str = "object does not exist";
 pub(super) struct Sender<'a> {
     /// The client's id.
     pub uuid: &'a str,
-    /// After how many seconds without a message the server may forget the client. With every request: a server that
-    /// has forgotten a client makes a new record of it with the next one, and asks for nothing.
+    /// Seconds without a message after which the server may forget the client. Sent with every request: a server that
+    /// has forgotten a client makes a new record of it with the next one, without asking for this.
     pub idle_timeout_s: u32,
     /// Language of the client, for the vendor's statistics; only with its first message.
     pub introduces: Option<&'static str>,
@@ -51,7 +51,7 @@ pub(super) fn request(func: &str, args: Vec<Value>, sender: &Sender<'_>) -> Vec<
     wire::encode(&wire::map(entries))
 }
 
-/// What a server says.
+/// A message of the server.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum ServerMessage {
     /// The call is done.
@@ -87,7 +87,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<ServerMessage, ReplyError> {
         let at = entries.iter().position(|(name, _)| name.text() == Some(key))?;
         Some(entries.swap_remove(at).1)
     };
-    // Whether the call succeeded stands in replies of version 1 alone.
+    // Only replies of version 1 state whether the call succeeded.
     if take("success").is_some() {
         return Ok(ServerMessage::OldProtocol);
     }

@@ -11,7 +11,7 @@ const U: &str = "6475756964782463303662333833322d353030382d346362622d623337322d3
 
 const SENDER: Sender<'_> = Sender { uuid: UUID, idle_timeout_s: 600, introduces: None };
 
-/// A recorded request with the client's time limit, which the recorded client says only once.
+/// A recorded request with the client's time limit, which the recorded client sends only once.
 fn limited(hex: &str) -> Vec<u8> {
     let mut bytes = bytes(&format!("{hex} 67 74696d656f7574 190258"));
     bytes[0] += 1;

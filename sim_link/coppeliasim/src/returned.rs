@@ -100,7 +100,7 @@ impl Returned {
     /// A CoppeliaSim pose (7 numbers) at `index`, stated to be `dst_from_src`.
     ///
     /// # Errors
-    /// As [`Self::number`]; [`LinkError::BadValue`] when it is no rigid transform.
+    /// As [`Self::number`]; [`LinkError::BadValue`] when it is not a rigid transform.
     pub(crate) fn pose<Dst, Src>(&self, index: usize) -> Result<Pose<Dst, Src>, LinkError> {
         self.checked(convert::pose_from_seven(&self.exactly::<7>(index)?))
     }
@@ -108,7 +108,7 @@ impl Returned {
     /// The image size `[width, height]` at `index`.
     ///
     /// # Errors
-    /// As [`Self::number`]; [`LinkError::BadValue`] when it is no size.
+    /// As [`Self::number`]; [`LinkError::BadValue`] when it is not a valid size.
     pub(crate) fn resolution(&self, index: usize) -> Result<(u32, u32), LinkError> {
         let [width, height] = self.exactly::<2>(index)?;
         self.checked(convert::resolution(width, height))

@@ -1,17 +1,17 @@
-//! Telling a simulation that another client holds from one that is slow.
+//! Distinguishes a simulation that another client holds from one that is slow.
 
 use std::time::{Duration, Instant};
 
-/// How long another client may hold the simulation before it is reported: longer than the slowest step of a program that is at
-/// work, and no longer than a person waits for an arm before looking elsewhere.
+/// How long another client may hold the simulation before it is reported: longer than the slowest step of a working program,
+/// and no longer than a user waits for an arm before looking for a fault.
 pub(super) const LONGEST_HOLD: Duration = Duration::from_secs(3);
 
-/// A server that is silent for longer computes a pass: it serves nobody meanwhile, while one that is held serves
-/// everybody. Half of [`LONGEST_HOLD`], because a call that waits for a pass may see the end of one before, and half as much
-/// again as the built-in cell lets a client wait for word.
+/// A server that is silent for longer computes a pass: it serves no client meanwhile, while one that is held serves all.
+/// Half of [`LONGEST_HOLD`], because a call that waits for a pass may see the end of the previous one, and 1.5 times the
+/// longest time that the built-in cell lets a client wait for a message.
 const PASS: Duration = Duration::from_millis(1500);
 
-/// A call that the server asks to wait, again and again.
+/// A call that the server asks to wait, repeatedly.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Standstill {
     /// Since when the server has answered all along.
@@ -25,7 +25,7 @@ impl Standstill {
         Self { since: now, heard: now }
     }
 
-    /// The server has asked to wait once more. Returns for how long it has done nothing else, once that is too long.
+    /// The server has asked to wait again. Returns how long it has done nothing else, once that is too long.
     pub(super) fn heard(&mut self, now: Instant) -> Option<Duration> {
         if now.saturating_duration_since(self.heard) > PASS {
             self.since = now;
@@ -40,7 +40,7 @@ impl Standstill {
 mod tests {
     use super::*;
 
-    /// When a server that answers at intervals of so many seconds is reported to be held.
+    /// When a server that answers at intervals of `interval_s` is reported to be held.
     fn held_after_s(interval_s: f64) -> Option<f64> {
         let start = Instant::now();
         let mut standstill = Standstill::begin(start);

@@ -31,7 +31,7 @@ pub enum Event {
     Reset,
 }
 
-/// What happened, for looking at after the fact.
+/// The events, to be inspected afterwards.
 #[derive(Clone, Default)]
 pub struct Log(Arc<Mutex<Vec<Event>>>);
 

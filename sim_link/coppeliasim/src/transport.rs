@@ -7,11 +7,11 @@ use super::error::LinkError;
 use handeye_wire::MAX_REPLY_BYTES;
 
 /// How long a last message may keep a closing socket alive. A server on this machine takes it in under a millisecond,
-/// on a busy one in a tenth of a second; one that has gone must not hold up the end of the program.
+/// on a busy one in a tenth of a second; one that has gone must not delay the end of the program.
 const FAREWELL: Duration = Duration::from_millis(500);
 
-/// When a connection breaks, the library says at once that it tries again, unless it has ended the connection itself,
-/// over a message that is too long. Nothing but its thread has to run for that.
+/// When a connection breaks, the library reports at once that it tries again, unless it has closed the connection
+/// itself because of a message that is too long. Only its own thread has to run for that.
 const RETRY_NEWS: Duration = Duration::from_millis(250);
 
 /// Pause before a refused connection is tried again: short, because a person waits for the server to come up.
@@ -50,10 +50,10 @@ pub trait Transport: Send {
     /// Gives the reply that is due up, so that the next request can be sent. A late reply is never delivered.
     fn reset(&mut self);
 
-    /// Sends a message whose reply nobody waits for, as well as it can be done without blocking, and resets.
+    /// Sends a message without waiting for a reply, as far as possible without blocking, and resets.
     fn send_last(&mut self, message: &[u8]);
 
-    /// Whether a server is on the other side, as far as is known since the last reset.
+    /// Whether a server is connected, as far as is known since the last reset.
     fn connected(&mut self) -> bool;
 
     /// Whether a connection that was made since the last reset has ended. The next request then goes out over another one.
@@ -76,7 +76,7 @@ pub struct ZmqTransport {
     lost: bool,
 }
 
-/// What it means that the address refuses a connection.
+/// The meaning of a refused connection.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Refusal {
     /// The server is not up yet.
@@ -221,8 +221,8 @@ impl Channel {
 
 impl Drop for Channel {
     /// A request socket that lingers, or is not reaped yet, still reports events, and the library's I/O thread would
-    /// wait for ever for a monitor that nobody reads now. So the reports are switched off first: they go to a
-    /// second monitor, which is told nothing.
+    /// wait forever for a monitor that nobody reads now. So the reports are switched off first: they go to a second
+    /// monitor, which receives nothing.
     fn drop(&mut self) {
         if let Err(error) = self.request.monitor(&format!("{MONITOR}-{}-off", self.serial), 0) {
             tracing::debug!(%error, "the monitor of a socket could not be switched off");

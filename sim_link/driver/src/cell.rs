@@ -45,8 +45,8 @@ pub struct DriverFrame {
     pub stamp_s: f64,
     /// When it was on the clock of the workbench \[s\]; `None` before the clocks are related.
     pub time_s: Option<f64>,
-    /// How far image and pose may be apart \[s\]: what the stamp is worth, and with two drivers how well their clocks are
-    /// related.
+    /// Largest time between image and pose \[s\]: the uncertainty of the timestamp and, with two drivers, of the relation
+    /// of their clocks.
     pub time_uncertainty_s: f64,
     /// The robot at the image's instant, or why it is not known.
     pub robot: Result<RobotAt, NoPose>,
@@ -55,7 +55,7 @@ pub struct DriverFrame {
 /// How the clocks of a robot and a camera that are two drivers relate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClockDifference {
-    /// What has to be added to a stamp of the camera to have one of the robot \[s\].
+    /// Offset to add to a timestamp of the camera to get one of the robot \[s\].
     pub robot_from_camera_s: f64,
     /// The true one is within ± this \[s\].
     pub uncertainty_s: f64,
@@ -65,7 +65,7 @@ impl DriverCell {
     /// Starts both. Their stamps are related to the same clock.
     ///
     /// # Errors
-    /// As [`Driver::start`]; [`DriverError::Cannot`] when the camera's has no images.
+    /// As [`Driver::start`]; [`DriverError::Cannot`] when the camera's driver has no images.
     pub fn start(spec: &DriverCellSpec, options: &DriverOptions, cancel: &CancelToken) -> Result<Self, DriverError> {
         let robot = Driver::start(&spec.robot, options, cancel)?;
         let camera = spec.camera.as_ref().map(|camera| Driver::start(camera, options, cancel)).transpose()?;
@@ -97,7 +97,7 @@ impl DriverCell {
         self.robot.timebase()
     }
 
-    /// Whether both are still there.
+    /// Whether both are still connected.
     ///
     /// # Errors
     /// [`DriverError::Gone`] names the one that is not.
@@ -106,7 +106,7 @@ impl DriverCell {
         self.camera.as_ref().map_or(Ok(()), Driver::check)
     }
 
-    /// Ends both, whoever has them yet.
+    /// Ends both, even if others still hold them.
     pub(crate) fn close(&self) {
         self.robot.close();
         if let Some(camera) = &self.camera {

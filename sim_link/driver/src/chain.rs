@@ -10,7 +10,7 @@ use super::message::{ArmMessage, Hello};
 /// The arm, where `hello` names one.
 ///
 /// # Errors
-/// What is wrong: a name that is none, a URDF that cannot be read, another number of joints than `joints` has.
+/// What is wrong: an unknown name, a URDF that cannot be read, another number of joints than `joints` has.
 pub fn arm_of(hello: &Hello) -> Result<Option<Arm>, String> {
     let arm = match &hello.arm {
         None => return Ok(None),

@@ -40,7 +40,7 @@ struct Owner {
     shared: Arc<Shared>,
     hello: Arc<Hello>,
     arm: Option<Arc<Arm>>,
-    /// One at a time asks for an image.
+    /// Held by the one caller that requests an image.
     camera_turn: Mutex<()>,
     watch: Option<JoinHandle<()>>,
 }
@@ -48,7 +48,7 @@ struct Owner {
 /// The newest state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RobotNow {
-    /// What the driver said, on its own clock.
+    /// The state as the driver reported it, on its own clock.
     pub reading: Reading,
     /// How old it is \[s\]; `None` before the clocks are related.
     pub age_s: Option<f64>,
@@ -65,7 +65,7 @@ pub struct DriverImage {
     pub intrinsics: Option<Intrinsics>,
     /// Middle of the exposure on the driver's clock \[s\].
     pub stamp_s: f64,
-    /// The instant is within ± this of the stamp, as the driver says \[s\].
+    /// Uncertainty of the timestamp as the driver reports it: the instant is within ± this \[s\].
     pub stamp_uncertainty_s: f64,
 }
 
@@ -120,17 +120,17 @@ impl Driver {
         &self.owner.shared.driver
     }
 
-    /// What it says of itself.
+    /// The driver's `hello`.
     pub fn hello(&self) -> &Hello {
         &self.owner.hello
     }
 
-    /// The chain of its joints, where it says which.
+    /// The chain of its joints, where the driver names it.
     pub fn chain(&self) -> Option<&Arm> {
         self.owner.arm.as_deref()
     }
 
-    /// Where that stands and what tool it carries, as far as its states tell.
+    /// Place of that chain and its tool, as far as its states show.
     pub fn chain_placement(&self) -> ChainPlacement {
         self.owner.shared.lock().chain.placement().clone()
     }
@@ -140,10 +140,10 @@ impl Driver {
         self.owner.shared.options.timebase
     }
 
-    /// Whether it is still there.
+    /// Whether the driver is still connected.
     ///
     /// # Errors
-    /// [`DriverError::Gone`] says how it ended.
+    /// [`DriverError::Gone`] with how it ended.
     pub fn check(&self) -> Result<(), DriverError> {
         let ending = self.owner.shared.lock().ending.clone();
         ending.map_or(Ok(()), |why| Err(self.owner.shared.gone(why)))
@@ -184,7 +184,7 @@ impl Driver {
         self.state()?.ok_or_else(|| self.no_answer("with a state", patience))
     }
 
-    /// The robot at an instant of the driver's own clock; waits, at most so long, for a state after it.
+    /// The robot at an instant of the driver's own clock; waits, at most for `patience`, for a state after it.
     ///
     /// # Errors
     /// [`DriverError::Gone`]; why there is no pose is the inner error.
@@ -204,7 +204,7 @@ impl Driver {
     /// this time, or when `cancel` is raised: a later call goes on waiting for the same one.
     ///
     /// # Errors
-    /// [`DriverError::Gone`], also when the bytes are no image; [`DriverError::Cannot`], [`DriverError::Refused`].
+    /// [`DriverError::Gone`], also when the bytes are not an image; [`DriverError::Cannot`], [`DriverError::Refused`].
     pub fn image(
         &self,
         after: Option<f64>,
@@ -274,7 +274,7 @@ impl Driver {
         })
     }
 
-    /// Ends it, whoever has it yet, and waits until it has ended.
+    /// Ends it, even if others still hold it, and waits until it has ended.
     pub(crate) fn close(&self) {
         let shared = &self.owner.shared;
         shared.finish(Ending::ClosedHere);
@@ -282,7 +282,7 @@ impl Driver {
         shared.wait_for_burial(shared.options.farewell + Duration::from_secs(1));
     }
 
-    /// What it has said for people since the last call.
+    /// Log lines of the driver since the last call.
     pub fn take_log(&self) -> Vec<LogLine> {
         self.owner.shared.lock().log.take()
     }
@@ -319,7 +319,8 @@ impl Drop for Owner {
     }
 }
 
-/// What the driver says of itself, and the chain of its joints; `None` when it has not in time, or is not to be started any more.
+/// The driver's `hello`, and the chain of its joints; `None` when it has not come in time, or the driver is not to be started any
+/// more.
 #[expect(clippy::type_complexity, reason = "hello and chain")]
 fn greeted(shared: &Shared, cancel: &CancelToken) -> Result<Option<(Arc<Hello>, Option<Arc<Arm>>)>, DriverError> {
     let options = &shared.options;
@@ -337,7 +338,7 @@ fn greeted(shared: &Shared, cancel: &CancelToken) -> Result<Option<(Arc<Hello>, 
     }
 }
 
-/// Stands where none has come yet.
+/// Placeholder where none has come yet.
 fn no_hello() -> Hello {
     Hello {
         protocol: PROTOCOL,

@@ -1,17 +1,17 @@
 //! How the clock of a driver relates to that of the workbench.
 //!
-//! A pong stamped `s` on the driver's clock, whose ping left at `t0` and which arrived at `t1` on ours, says that
-//! `ours − driver's` lies in `[t0 − s, t1 − s]`: whatever the way there and back took, the stamp was made in between. The
-//! intervals of many pongs, widened by what two clocks may drift apart since, are cut with one another. The middle of what
-//! is left is the offset and half its width a bound of its error, not a guess; the pong that was fastest decides, as in the
-//! usual filter by least round trip.
+//! A pong stamped `s` on the driver's clock, whose ping left at `t0` and which arrived at `t1` on ours, shows that `ours −
+//! driver's` lies in `[t0 − s, t1 − s]`: whatever the way there and back took, the stamp was made in between. The intervals
+//! of many pongs, widened by what two clocks may drift apart since, are intersected. The middle of their intersection is
+//! the offset and half its width a strict bound of its error; the pong that was fastest decides, as in the usual filter by
+//! least round trip.
 
 use std::collections::VecDeque;
 use std::time::Instant;
 
 /// How fast two clocks may drift apart: crystals of computers are within 50 parts in a million each.
 const DRIFT: f64 = 1e-4;
-/// For how long a pong counts \[s\]: after it the drift makes it worse than any new one.
+/// How long a pong is used \[s\]: after it the drift makes it worse than any new one.
 const MEMORY_S: f64 = 30.0;
 /// Most pongs that are kept.
 const MOST: usize = 256;
@@ -38,7 +38,7 @@ impl Default for Timebase {
     }
 }
 
-/// What has to be added to a stamp of the driver to have the time of the workbench.
+/// Offset to add to a timestamp of the driver to get the time of the workbench.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Offset {
     /// The offset \[s\].
@@ -66,8 +66,8 @@ pub struct ClockOffset {
 }
 
 impl ClockOffset {
-    /// A pong: when its ping left and when it arrived on our clock, and the driver's stamp, all in seconds. One that
-    /// contradicts those before says that a clock was set: they are forgotten.
+    /// A pong: when its ping left and when it arrived on our clock, and the driver's stamp, all in seconds. A pong that
+    /// contradicts those before shows that a clock was set: those are discarded.
     pub(crate) fn add(&mut self, left_s: f64, arrived_s: f64, stamp_s: f64) {
         let pong = Pong { arrived: arrived_s, least: left_s - stamp_s, greatest: arrived_s - stamp_s };
         if let Some((low_s, high_s)) = self.interval(arrived_s)

@@ -1,4 +1,4 @@
-//! Why a driver does not do what it is asked for.
+//! Errors of requests to a driver.
 
 use std::time::Duration;
 
@@ -6,11 +6,11 @@ use super::message::Ability;
 use super::spec::BadSpec;
 use super::wire::WireError;
 
-/// Why a driver does not do what it is asked for. Each names the driver.
+/// Why a request to a driver failed. Each error names the driver.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum DriverError {
-    /// The text names none.
+    /// The text does not name a driver.
     #[error(transparent)]
     Spec(#[from] BadSpec),
     /// The program cannot be started.
@@ -18,7 +18,7 @@ pub enum DriverError {
     Start {
         /// The command line of the driver.
         command: String,
-        /// What the system said.
+        /// The error of the operating system.
         why: String,
     },
     /// Nobody answers at the address.
@@ -26,7 +26,7 @@ pub enum DriverError {
     Connect {
         /// HOST:PORT.
         address: String,
-        /// What the system said.
+        /// The error of the operating system.
         why: String,
     },
     /// It worked and is gone, or it never became ready. Starting it again is worth a try.
@@ -42,18 +42,18 @@ pub enum DriverError {
     Preparing {
         /// Its command or address.
         driver: String,
-        /// What is being done, as it says.
+        /// What is being done, as the driver reports it.
         what: String,
     },
-    /// It does not say that it can.
+    /// The driver does not report that it can.
     #[error("the driver `{driver}` cannot do this: it has no `{ability}` in `can`")]
     Cannot {
         /// Its command or address.
         driver: String,
-        /// What it would need.
+        /// The ability that is needed.
         ability: Ability,
     },
-    /// What `hello` says of the arm is not usable.
+    /// The arm in `hello` is not usable.
     #[error("the driver `{driver}`: arm: {why}")]
     Arm {
         /// Its command or address.
@@ -66,7 +66,7 @@ pub enum DriverError {
     NotArmed {
         /// Its command or address.
         driver: String,
-        /// Why it is no longer armed, where it was and has said so.
+        /// Why it is no longer armed, where the driver has reported that.
         why: Option<String>,
     },
     /// A motion is under way.
@@ -75,14 +75,14 @@ pub enum DriverError {
         /// Its command or address.
         driver: String,
     },
-    /// The driver says no.
+    /// The driver refuses.
     #[error("the driver `{driver}` refuses {what}: {why}")]
     Refused {
         /// Its command or address.
         driver: String,
-        /// What was asked for.
+        /// The request.
         what: &'static str,
-        /// What it says.
+        /// The reason as the driver reports it.
         why: String,
     },
     /// A request was not answered in time. The connection is closed where the arm might move.
@@ -90,9 +90,9 @@ pub enum DriverError {
     NoAnswer {
         /// Its command or address.
         driver: String,
-        /// What was asked for.
+        /// The request.
         what: &'static str,
-        /// How long was waited.
+        /// How long it waited.
         after: Duration,
     },
 }
@@ -129,13 +129,13 @@ pub enum Ending {
     /// It sent something that breaks the protocol.
     #[error("broke the protocol: {0}")]
     Broken(WireError),
-    /// It said that it cannot go on.
+    /// It reported that it cannot go on.
     #[error("gave up: {0}")]
     GaveUp(String),
     /// No answer to `hello`.
     #[error("has not answered `hello` within {seconds} s{last}", seconds = after.as_secs_f64(), last = last(last_line.as_ref()))]
     NoHello {
-        /// How long was waited.
+        /// How long it waited.
         after: Duration,
         /// The last line that it printed to standard error.
         last_line: Option<String>,
@@ -149,7 +149,7 @@ pub enum Ending {
     /// It does not read what it is sent.
     #[error("does not read what it is sent")]
     NotReading,
-    /// It did not stop a motion when it was told to.
+    /// It did not stop a motion when it was asked to.
     #[error("did not come to rest after `stop`; the connection was closed")]
     DoesNotStop,
     /// This program closed it.

@@ -1,9 +1,9 @@
 //! All processes that come from a driver, wherever they have gone.
 //!
-//! A process group is left by whoever begins a session of its own (`setsid`, a daemon, Python's `start_new_session`), and
-//! the parent of an orphan is no longer the driver. What all of them have is the environment that they were started with:
-//! a driver gets a mark in it, which its children inherit. Who was started without the environment is still found below a
-//! parent that lives. Where there is no `/proc`, only the group is known.
+//! A process leaves its group when it begins a new session (`setsid`, a daemon, Python's `start_new_session`), and the
+//! parent of an orphan is no longer the driver. All of them have the environment that they were started with: a driver
+//! gets a mark in it, which its children inherit. A process started without the environment is still found below a living
+//! parent. Where there is no `/proc`, only the group is known.
 
 use std::collections::HashSet;
 use std::fs;
@@ -34,7 +34,7 @@ pub struct Family {
 }
 
 impl Family {
-    /// Of a program that is about to be started.
+    /// For a program that is about to be started.
     pub fn of(command: &mut Command) -> Self {
         static STARTED: AtomicU64 = AtomicU64::new(0);
         let number = STARTED.fetch_add(1, Ordering::Relaxed);
@@ -62,13 +62,13 @@ impl Family {
 
     fn is_marked(&self, id: i32) -> bool {
         let mut environment = Vec::new();
-        // One of another user, or one that has just ended, says nothing.
+        // A process of another user, or one that has just ended, cannot be read.
         let read = fs::File::open(format!("/proc/{id}/environ"));
         let read = read.and_then(|file| file.take(LARGEST).read_to_end(&mut environment));
         read.is_ok() && environment.split(|byte| *byte == 0).any(|text| text == self.mark.as_bytes())
     }
 
-    /// Kills these, and whoever else comes from the driver, until nobody is left.
+    /// Kills these processes and all others of the driver, until none is left.
     pub fn kill(&self, mut living: Vec<Process>) {
         let until = Instant::now() + PATIENCE;
         loop {

@@ -12,13 +12,13 @@ use super::options::{DriverOptions, Preparing};
 use super::pending::{PendingStart, Waited};
 use super::starts::{Failure, Permit, Starts};
 
-/// How long until a start that is being prepared is looked at again.
+/// Interval at which a start that is being prepared is checked.
 const LOOK_AGAIN: Duration = Duration::from_millis(500);
 
 /// Keeps a cell running. Threads ask it for the cell whenever theirs is gone; what it gives is the same cell for all.
 ///
-/// A cell that is gone is started again when somebody asks, with pauses that grow as long as starts come to nothing, and in the
-/// end no more until [`Self::again`]. Whoever asks in a pause is told how long it is, and nothing is started.
+/// A cell that is gone is started again on request, with pauses that grow as long as starts fail, and in the end no more until
+/// [`Self::again`]. A request during a pause returns the rest of the pause, and nothing is started.
 #[derive(Debug)]
 pub struct DriverHost {
     spec: DriverCellSpec,
@@ -38,32 +38,32 @@ struct Kept {
     /// A start that is under way.
     pending: Option<PendingStart>,
     starts: Starts,
-    /// Why there is none.
+    /// Why there is no cell.
     error: Option<DriverError>,
 }
 
 /// Why there is no cell.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NoCell {
-    /// Starts came to nothing and the next is after a pause, or the one under way takes long.
+    /// Starts failed and the next is after a pause, or the one under way takes long.
     Later {
         /// Why the last one did, or [`DriverError::Preparing`].
         error: DriverError,
-        /// How many in a row.
+        /// Number of failed starts in a row.
         tries: u32,
-        /// How long the pause is yet.
+        /// Rest of the pause.
         pause: Duration,
     },
-    /// Starts came to nothing, and there is none by itself any more.
+    /// Starts failed, and there are no more automatic ones.
     Over {
         /// Why the last one did.
         error: DriverError,
-        /// How many in a row.
+        /// Number of failed starts in a row.
         tries: u32,
     },
     /// Somebody wants that nothing is started.
     Rests {
-        /// Why the last start came to nothing, or how the last cell ended.
+        /// Why the last start failed, or how the last cell ended.
         error: Option<DriverError>,
     },
 }
@@ -98,7 +98,7 @@ impl DriverHost {
                 Ok(()) => return Ok(kept.cell.insert(cell).clone()),
                 Err(error) => kept.error = Some(error),
             }
-            // Both halves of it, whoever has them yet: a device takes one program at a time.
+            // Both halves of it, even if others still hold them: a device takes one program at a time.
             cell.close();
             kept.starts.ended(self.now_s());
         }
@@ -143,7 +143,7 @@ impl DriverHost {
         PendingStart::begin(&self.spec, options, cancel).map_err(|error| self.failed(kept, error))
     }
 
-    /// Counts a start that came to nothing.
+    /// Counts a failed start.
     fn failed(&self, kept: &mut Kept, error: DriverError) -> NoCell {
         kept.error = Some(error.clone());
         let now_s = self.now_s();
@@ -157,14 +157,14 @@ impl DriverHost {
         self.halt().cancel();
     }
 
-    /// Has the next who asks start at once, however often that came to nothing before. Waits for nothing.
+    /// The next request starts at once, however often starts failed before. Waits for nothing.
     pub fn again(&self) {
         *self.halt() = CancelToken::default();
         self.is_asked.store(true, Ordering::Release);
         self.rests.store(false, Ordering::Release);
     }
 
-    /// Ends the cell, whoever has it yet.
+    /// Ends the cell, even if others still hold it.
     pub fn close(&self) {
         if let Some(cell) = self.kept.lock().unwrap_or_else(PoisonError::into_inner).cell.take() {
             cell.close();
@@ -182,7 +182,7 @@ impl DriverHost {
 
 impl Drop for DriverHost {
     fn drop(&mut self) {
-        // A start under way would go on for nobody.
+        // A start under way would go on with nobody waiting for it.
         self.halt().cancel();
     }
 }

@@ -34,7 +34,8 @@ fn a_driver_that_ends_at_once_is_not_started_by_everybody_who_asks_and_says_why_
     };
     assert_eq!(last_line.as_deref(), Some("no camera is plugged in"));
     for _ in 0..1000 {
-        // The longest pause is 15 s: whatever the machine does meanwhile, a thousand questions are no thousand starts.
+        // The longest pause is 15 s: whatever the machine does meanwhile, a thousand requests are not a thousand
+        // starts.
         let NoCell::Later { error, .. } = host.cell(&cancel).unwrap_err() else { panic!("it is tried again") };
         assert!(error.to_string().contains("no camera is plugged in"), "{error}");
     }

@@ -20,11 +20,11 @@ use super::wire::WireProblem;
 /// Unknown types of messages that are named in the log.
 const MOST_UNKNOWN: usize = 32;
 
-/// A stamp of a state or an image is not later than that of the next pong by more than this \[s\]: what a clock may be set by, and what
-/// threads of a driver may lie apart.
+/// A stamp of a state or an image is not later than that of the next pong by more than this \[s\]: a possible step of a clock, and
+/// the delay between threads of a driver.
 const MOST_AHEAD_S: f64 = 1.0;
 
-/// How far a request is.
+/// State of a request.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Progress {
     /// On its way.
@@ -40,7 +40,7 @@ pub enum Progress {
     Refused(String),
 }
 
-/// How a driver ended once it was told to.
+/// How a driver ended once it was asked to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum DriverExit {
     /// The process ended by itself.
@@ -58,7 +58,7 @@ pub enum DriverExit {
     LeftOpen,
 }
 
-/// An image that is asked for, and what has come of it.
+/// A requested image, and its received parts.
 #[derive(Debug)]
 pub struct FrameRequest {
     pub id: u64,
@@ -76,16 +76,16 @@ impl FrameRequest {
     }
 }
 
-/// What has been read to its end.
+/// Which outputs have been read to their end.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct DrainedOutput {
-    /// What the driver sends.
+    /// Standard output.
     pub output: bool,
     /// Standard error.
     pub errors: bool,
 }
 
-/// What a conformance run does otherwise than the workbench, to see what the driver does about that.
+/// What a conformance run does differently from the workbench, to test the driver's reaction.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Trial {
     /// No pings are sent.
@@ -99,9 +99,9 @@ pub struct Trial {
 pub struct Inner {
     pub hello: Option<Arc<Hello>>,
     pub arm: Option<Arc<Arm>>,
-    /// What its states say of it.
+    /// Placement of the chain by the states.
     pub chain: ChainWatch,
-    /// How many `preparing` have come.
+    /// Number of `preparing` messages.
     pub preparations: u64,
     /// Why it is over.
     pub ending: Option<Ending>,
@@ -111,9 +111,9 @@ pub struct Inner {
     pub pings: VecDeque<(u64, f64)>,
     /// When the newest pong came, and its stamp.
     pub last_pong: Option<(f64, f64)>,
-    /// How many pongs have come.
+    /// Number of pongs.
     pub pongs: u64,
-    /// How many states have come.
+    /// Number of states.
     pub state_count: u64,
     /// When the last pong came, or the hello.
     pub last_heard_s: f64,
@@ -126,7 +126,7 @@ pub struct Inner {
     pub is_armed: bool,
     /// The request whose answer arms it: what is reported after that answer may take it back at once.
     pub arming: Option<u64>,
-    /// Why it is no longer, where the driver has said so.
+    /// Why it is no longer armed, where the driver has reported that.
     pub disarmed: Option<String>,
     pub is_moving: bool,
     pub log: LogLines,
@@ -144,7 +144,7 @@ impl Inner {
     /// Takes in a message.
     ///
     /// # Errors
-    /// [`WireProblem`] for one that does not belong where it stands.
+    /// [`WireProblem`] for a message in the wrong place.
     pub fn take(&mut self, message: FromDriver, bytes: Vec<u8>, arrived_s: f64) -> Result<(), WireProblem> {
         let is_early = self.hello.is_none();
         match message {
@@ -307,7 +307,7 @@ impl Inner {
         }
     }
 
-    /// When the driver was last heard; `None` before its hello.
+    /// When the last pong or the hello came; `None` before the hello.
     pub fn heard_s(&self) -> Option<f64> {
         self.hello.as_ref().map(|_| self.last_heard_s)
     }

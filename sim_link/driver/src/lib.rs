@@ -1,4 +1,4 @@
-//! Robots and cameras through programs that speak JSON lines, on standard input and output or over TCP.
+//! Robots and cameras through programs that exchange JSON lines, on standard input and output or over TCP.
 //!
 //! The protocol is on one page, `docs/drivers.md`.
 //!
@@ -8,7 +8,7 @@
 //! | [`wire`] | lines and the bytes that follow them, with limits |
 //! | [`Driver`] | one program: state, images, motions, log, how it ended |
 //! | [`DriverHost`] | the same cell for several threads, started again when it is gone |
-//! | [`limits`] | what is asked of one in numbers |
+//! | [`limits`] | numeric requirements for one |
 //! | [`conformance`] | whether a program keeps to the protocol |
 //! | [`fake`] | a driver with the built-in cell behind it |
 //! | [`DriverCell`] | a robot and a camera, in one program or two: images with the pose at their instant |

@@ -1,15 +1,16 @@
-//! What the workbench asks of a driver in numbers. `docs/drivers.md` has them for those who write one, and a test holds both
-//! together.
+//! The numeric limits of the workbench for a driver. `docs/drivers.md` lists them for authors of drivers, and a test keeps
+//! both equal.
 
 use std::time::Duration;
 
 use handeye_capture::NO_IMAGES_S;
 
-/// The states before and after an image are no farther apart than this \[s\]: they say too little of what was between them.
+/// The states before and after an image are no farther apart than this \[s\]: with longer gaps the pose between them is not
+/// known well enough.
 pub const STATES_APART_S: f64 = 0.25;
-/// An image waits for the state after it for so long: three of the slowest driver.
+/// An image waits this long for the state after it: three states of the slowest driver.
 pub(crate) const STATE_AFTER_IMAGE: Duration = Duration::from_millis(300);
-/// An image is no older than this when it is here \[s\]: what is seen is to be what is done.
+/// An image is no older than this on arrival \[s\]: the view should show the present.
 pub(crate) const IMAGE_AGE_S: f64 = 1.0;
 /// The first state and the first image come within this time after `hello`, which is answered before anything slow is loaded.
 pub const FIRST: Duration = Duration::from_secs(10);

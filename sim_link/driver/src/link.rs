@@ -16,15 +16,15 @@ use super::spec::DriverSpec;
 
 /// Longest wait for a TCP connection, and for a driver that does not take what is sent to it.
 const TCP_PATIENCE: Duration = Duration::from_secs(3);
-/// How often an end is looked for.
+/// Interval at which the end of a process is checked.
 const POLL: Duration = Duration::from_millis(5);
 
 /// A driver that is reached.
 pub struct Link {
     pub output: Box<dyn Read + Send>,
-    /// What it is sent. Dropping it is the end of its standard input.
+    /// Writes to the driver. Dropping it closes its standard input.
     pub input: Box<dyn Write + Send>,
-    /// What it prints for people; over TCP there is none.
+    /// Its standard error; none over TCP.
     pub errors: Option<Box<dyn Read + Send>>,
     /// How it is ended.
     pub end: LinkEnd,
@@ -55,7 +55,7 @@ impl Link {
         let failed = |why: String| DriverError::Start { command: words.join(" "), why };
         let (program, arguments) = words.split_first().ok_or_else(|| failed("no program is named".to_owned()))?;
         let mut command = Command::new(executable(program));
-        // A group of its own: Ctrl-C in a terminal is for the workbench, which brakes the arm before it ends the driver.
+        // A separate group: Ctrl-C in a terminal is for the workbench, which brakes the arm before it ends the driver.
         command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
         let family = Family::of(&mut command);
         let mut child = command.spawn().map_err(|error| failed(error.to_string()))?;
@@ -96,15 +96,15 @@ impl Link {
 /// The name of the program that drivers come with.
 const WORKBENCH: &str = "handeye";
 
-/// What is started for the first word of a command: this program for its own name, so that the drivers that come with it are
-/// found where it is not on the `PATH`, and are of its version.
+/// The program to start for the first word of a command: this program for its own name, so that the drivers that come with
+/// it are found where it is not on the `PATH`, and are of its version.
 fn executable(named: &str) -> PathBuf {
     let own = || std::env::current_exe().ok().filter(|own| own.file_stem().is_some_and(|stem| stem == WORKBENCH));
     Some(named).filter(|&named| named == WORKBENCH).and_then(|_| own()).unwrap_or_else(|| named.into())
 }
 
 impl LinkEnd {
-    /// How the process ended, if it has within this time; never over TCP.
+    /// Exit status of the process, if it has ended within this time; never over TCP.
     pub fn ended_within(&mut self, patience: Duration) -> Option<ExitStatus> {
         let Self::Process(child, _) = self else { return None };
         let until = Instant::now() + patience;
@@ -117,7 +117,7 @@ impl LinkEnd {
         }
     }
 
-    /// What comes from a process that still runs; none over TCP.
+    /// Running processes of the driver; none over TCP.
     pub fn living(&mut self) -> Vec<Process> {
         let Self::Process(child, family) = self else { return Vec::new() };
         let is_running = matches!(child.try_wait(), Ok(None));

@@ -1,4 +1,4 @@
-//! What a driver says for people: `log` messages and standard error, the newest of it.
+//! The log of a driver: `log` messages and standard error, the newest lines.
 
 use std::collections::VecDeque;
 
@@ -12,11 +12,11 @@ pub const LONGEST: usize = 2048;
 /// A line that a driver wrote for the log.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LogLine {
-    /// How much it matters; standard error counts as [`LogLevel::Info`].
+    /// Severity; standard error counts as [`LogLevel::Info`].
     pub level: LogLevel,
     /// Whether it was printed to standard error, and not sent as a message.
     pub is_printed: bool,
-    /// What it says.
+    /// Text of the line.
     pub text: String,
 }
 

@@ -25,10 +25,10 @@ pub enum Goal {
 pub enum MoveEnd {
     /// It is there.
     Arrived,
-    /// The driver says that it is there, and its states say that it moves, or is elsewhere: from where it was, or was to be, to where
-    /// it is.
+    /// The driver reports that it is there, but its states show that it moves, or is elsewhere: from where it was, or should be, to
+    /// where it is.
     NotThere(Moved),
-    /// The driver says that it is there, and sends no states that would show it.
+    /// The driver reports that it is there, and sends no states that would show it.
     Unseen,
     /// It was stopped on its way, and why.
     Stopped(String),
@@ -66,7 +66,7 @@ impl Driver {
                 drop(inner);
                 Err(self.no_answer(what, shared.options.answer))
             }
-            // A driver that may still move is none to stay connected with.
+            // A driver that may still move must not stay connected.
             None => Err(self.end(Ending::DoesNotStop)),
         }
     }
@@ -131,7 +131,7 @@ impl Driver {
         })
     }
 
-    /// What the states say of a motion that is done.
+    /// What the states show about a motion that is done.
     fn seen_at(&self, goal: &Goal) -> Result<MoveEnd, DriverError> {
         let shared = self.shared();
         let (mut watch, mut last_s) = (RestWatch::default(), None);
@@ -165,7 +165,7 @@ impl Driver {
     }
 }
 
-/// From the goal to where the arm stands, where that is another place.
+/// From the goal to where the arm is, where that is another place.
 fn elsewhere(goal: &Goal, place: &Place) -> Option<Moved> {
     match (goal, &place.joints) {
         (Goal::Joints(goal), Some(joints)) if goal.len() == joints.len() => {

@@ -8,11 +8,11 @@ use serde_json::{Value, json};
 use super::*;
 use crate::{DriverOptions, DriverSpec};
 
-/// Where the one joint of a driver is at a stamp, once it has said that its motion is done.
+/// Where the one joint of a driver is at a stamp, once it has reported that its motion is done.
 type After = fn(f64) -> f64;
 
-/// A driver that sends a state for every message that it hears, 0.05 s later each by its clock, and answers every request with
-/// `done` at once. No time passes but by messages; pings come five times a second.
+/// A driver that sends a state for every message that it receives, each 0.05 s later on its clock, and answers every request
+/// with `done` at once. Time passes only with messages; pings come five times a second.
 fn driver(after: After) -> Driver {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("tcp://{}", listener.local_addr().unwrap());
@@ -65,7 +65,7 @@ fn moved(after: After) -> MoveEnd {
 
 #[test]
 fn a_motion_is_over_when_the_states_say_so_whatever_the_driver_says() {
-    // It says `done` as soon as it has begun, and gets there.
+    // It sends `done` as soon as it has begun, and gets there.
     assert_eq!(moved(|after_s| after_s.min(0.6)), MoveEnd::Arrived);
     let MoveEnd::NotThere(Moved::Joint { index: 0, from, to }) = moved(|after_s| -after_s) else {
         panic!("it turns on")

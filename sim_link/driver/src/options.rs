@@ -1,4 +1,4 @@
-//! How long to wait for what.
+//! Timeouts.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -16,23 +16,23 @@ pub struct DriverOptions {
     pub preparation: Duration,
     /// How often a ping is sent.
     pub ping_every: Duration,
-    /// A driver without a pong for so long is gone.
+    /// A driver without a pong for this long is gone.
     pub silence: Duration,
     /// Longest wait for the answer to a short request, and for an arm that brakes.
     pub answer: Duration,
     /// Longest motion.
     pub motion: Duration,
-    /// How long a driver may take to end by itself before it is killed.
+    /// How long a driver may take to end by itself before its process is killed.
     pub farewell: Duration,
     /// The clock of the workbench. Drivers that belong together share it.
     pub timebase: Timebase,
     /// Gives up a start that waits for `hello`.
     pub halt: CancelToken,
-    /// What a start waits for.
+    /// Text of a start that is being prepared.
     pub preparing: Preparing,
 }
 
-/// The text of the newest `preparing`, for whoever waits for the start. Clones are the same.
+/// The text of the newest `preparing`, for those that wait for the start. Clones share it.
 #[derive(Debug, Clone, Default)]
 pub struct Preparing(Arc<Mutex<Option<String>>>);
 

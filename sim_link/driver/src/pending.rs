@@ -1,4 +1,4 @@
-//! A start of drivers that goes on in a thread of its own, since one that is being prepared takes minutes.
+//! A start of drivers that goes on in its own thread, since one that is being prepared takes minutes.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::Duration;
@@ -9,7 +9,7 @@ use super::cell::{DriverCell, DriverCellSpec};
 use super::error::DriverError;
 use super::options::{DriverOptions, Preparing};
 
-/// How often a preparation is looked for.
+/// Interval at which a preparation is checked.
 const POLL: Duration = Duration::from_millis(20);
 
 #[derive(Debug)]
@@ -21,7 +21,7 @@ pub struct PendingStart {
     pub halt: CancelToken,
 }
 
-/// What became of a start that was waited for.
+/// Result of waiting for a start.
 pub(super) enum Waited {
     /// It is over.
     Ended(Result<DriverCell, DriverError>),
@@ -33,7 +33,7 @@ impl PendingStart {
     /// Begins it. Raising `cancel` gives it up as well.
     ///
     /// # Errors
-    /// [`DriverError::Start`] where there is no thread for it.
+    /// [`DriverError::Start`] where no thread can be started for it.
     pub fn begin(spec: &DriverCellSpec, options: DriverOptions, cancel: &CancelToken) -> Result<Self, DriverError> {
         let (send, started) = sync_channel(1);
         let (spec, cancel) = (spec.clone(), cancel.clone());
@@ -50,7 +50,7 @@ impl PendingStart {
         }
     }
 
-    /// Waits for its end, or until the driver says that it is being prepared: then it goes on.
+    /// Waits for its end, or until the driver reports that it is being prepared: then the start goes on.
     pub fn wait(self) -> Waited {
         loop {
             match self.started.recv_timeout(POLL) {

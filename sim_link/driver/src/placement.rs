@@ -1,14 +1,14 @@
-//! Where the chain of a robot behind a driver stands and what tool it carries, as far as its states tell.
+//! Place and tool of the chain of a robot behind a driver, as far as its states show.
 //!
-//! A state has the values of the joints and the pose of the tip. One of them fits any place of the chain with some tool, so it
-//! proves nothing, and an arm that is driven by a chain that is not its own goes where nobody looked. What proves it:
+//! A state has the values of the joints and the pose of the tip. A single state fits any place of the chain with some tool, so
+//! it proves nothing, and an arm that is driven by a wrong chain moves along an unchecked path. These prove it:
 //!
-//! - the flange that the controller reports beside the tip, where the chain has it too;
+//! - the flange that the controller reports in addition to the tip, where the chain has it too;
 //! - a tip that is computed from the chain, which is then the pose of all captures;
-//! - several places at which the arm stood, turned about two axes: place and tool are then determined
-//!   ([`place`]), and what is left over says whether the joints belong to the poses.
+//! - several places at which the arm was at rest, turned about two axes: place and tool are then determined
+//!   ([`place`]), and the residuals show whether the joints belong to the poses.
 //!
-//! Each state at rest after that is compared, and one that does not fit ends it.
+//! Each state at rest after that is compared, and one that does not fit ends the placement.
 
 use std::sync::Arc;
 
@@ -22,7 +22,8 @@ use super::rest::RestWatch;
 use super::states::Reading;
 use handeye_coppeliasim::cell::ArmKinematics;
 
-/// Places are told apart by a turn of so much \[rad\]: a degree that joints and poses may differ by is a small part of it.
+/// Places count as different from this turn on \[rad\]: a degree that joints and poses may differ by is a small part of
+/// it.
 const APART_RAD: f64 = 15.0 * std::f64::consts::PI / 180.0;
 /// Sine of the angle between two axes that count as two.
 const TWO_AXES: f64 = 0.34;
@@ -31,44 +32,44 @@ pub const NEED: usize = 4;
 /// Most places that are kept.
 const MOST: usize = 16;
 
-/// What is known of the chain of a robot behind a driver.
+/// What is known about the chain of a robot behind a driver.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum ChainPlacement {
     /// The driver names no chain, or reports no joints.
     #[default]
     Unnamed,
-    /// So many of the [`NEED`] places are there yet, or they are not turned about two axes.
+    /// Fewer than the [`NEED`] places are there yet, or they are not turned about two axes.
     Open {
-        /// Places at which the arm stood.
+        /// Number of places at which the arm was at rest.
         places: usize,
     },
-    /// It stands there and carries this tool, and joints and poses belong together.
+    /// Place and tool of the chain are known, and joints and poses belong together.
     Known(Arc<ArmKinematics>),
-    /// The chain is not that of the robot, or stands elsewhere than the driver says.
+    /// The chain is not that of the robot, or is elsewhere than the driver reports.
     Foreign {
-        /// Between the reported tip, or flange, and that of the joints, metres.
+        /// Distance between the reported tip, or flange, and that of the joints, metres.
         distance_m: f64,
-        /// And radians.
+        /// Angle between them, radians.
         angle_rad: f64,
     },
 }
 
-/// A place at which the arm stood.
+/// A place at which the arm was at rest.
 #[derive(Debug, Clone)]
 struct RestPose {
     joints: JointValues,
     base_from_tip: Pose<Base, Tip>,
-    /// How the chain turns its end there.
+    /// Rotation of the end of the chain there.
     turned: nalgebra::UnitQuaternion<f64>,
 }
 
-/// Finds it from state to state.
+/// Finds the placement from state to state.
 #[derive(Debug, Default)]
 pub struct ChainWatch {
     /// Bare, with the ranges of driver and chain.
     chain: Option<Arm>,
     is_ur5: bool,
-    /// Where the driver says that the chain stands.
+    /// Place of the chain as the driver reports it.
     base_from_arm: Isometry3<f64>,
     rests: Vec<RestPose>,
     rest: RestWatch,
@@ -76,10 +77,10 @@ pub struct ChainWatch {
 }
 
 impl ChainWatch {
-    /// Of a driver that says this of itself, and has this chain.
+    /// For a driver with this `hello` and this chain.
     ///
     /// # Errors
-    /// A sentence, where ranges or place are none.
+    /// A sentence, where ranges or place are invalid.
     pub fn new(hello: &Hello, arm: Option<&Arm>) -> Result<Self, String> {
         let Some(arm) = arm.filter(|arm| hello.joints.len() == arm.joint_count()) else { return Ok(Self::default()) };
         let ranges: Vec<JointRange> = arm
@@ -105,7 +106,7 @@ impl ChainWatch {
         })
     }
 
-    /// The same arm where the driver says that it stands.
+    /// The same arm at the place that the driver reports.
     pub fn placed(&self, arm: Arm) -> Arm {
         let (base_from_first, flange_from_tip) = (self.base_from_arm * arm.base_from_first, arm.flange_from_tip);
         arm.mounted(base_from_first, flange_from_tip)
@@ -155,7 +156,7 @@ impl ChainWatch {
         }
     }
 
-    /// Whether the arm stands in this state.
+    /// Whether the arm is at rest in this state.
     fn stood(&mut self, reading: &Reading) -> bool {
         if reading.moving == Some(true) {
             self.rest.restart();
@@ -163,7 +164,7 @@ impl ChainWatch {
         self.rest.take(reading.place())
     }
 
-    /// A place more, where it is another one; and what all of them say.
+    /// Adds a place, where it differs from the others, and evaluates all of them.
     fn add_rest(&mut self, rest: &RestPose) {
         let is_other = |known: &RestPose| known.turned.angle_to(&rest.turned) >= APART_RAD;
         if self.rests.len() >= MOST || !self.rests.iter().all(is_other) {
@@ -181,7 +182,7 @@ impl ChainWatch {
             .iter()
             .map(|(base_from_tip, joints)| JointView { base_from_tip: *base_from_tip, joints_rad: joints })
             .collect();
-        // What the places do not determine takes another one.
+        // What these places do not determine needs another one.
         let Ok(placed) = place(chain, &views) else { return };
         let excess = |miss: &(f64, f64)| (miss.0 / DISTANCE_LIMIT_M).max(miss.1 / ROTATION_LIMIT_RAD);
         let worst = placed.misses.iter().copied().max_by(|a, b| excess(a).total_cmp(&excess(b)));
@@ -212,7 +213,7 @@ fn foreign((distance_m, angle_rad): (f64, f64)) -> ChainPlacement {
     ChainPlacement::Foreign { distance_m, angle_rad }
 }
 
-/// Whether joints and poses belong together; what is not a number does not.
+/// Whether joints and poses belong together; NaN does not.
 fn is_near((distance_m, angle_rad): (f64, f64)) -> bool {
     distance_m <= DISTANCE_LIMIT_M && angle_rad <= ROTATION_LIMIT_RAD
 }

@@ -27,7 +27,7 @@ fn hello(arm: ArmKind) -> Hello {
     }
 }
 
-/// A controller that has its base somewhere, and a tool that nobody else knows.
+/// A controller that has its base somewhere, and a tool that only it knows.
 fn base_from_arm() -> Isometry3<f64> {
     Isometry3::new(Vector3::new(0.3, -0.7, 0.4), Vector3::new(0.0, 0.0, 2.0))
 }
@@ -40,7 +40,7 @@ fn message(pose: Isometry3<f64>) -> PoseMessage {
     PoseMessage::of(&Pose::<Base, Tip>::from_isometry(pose))
 }
 
-/// What a controller says that is an arm of this kind, of poses for these joints.
+/// State of a controller that is an arm of this kind, with its poses for these joints.
 fn state(of: ArmKind, joints: [f64; 6], stamp: f64) -> StateMessage {
     let flange = base_from_arm() * of.arm().forward(&joints).unwrap().isometry();
     StateMessage {
@@ -98,7 +98,7 @@ fn the_flange_beside_the_tip_places_the_chain_at_once() {
 
 #[test]
 fn a_flange_that_is_elsewhere_than_the_chain_has_it_is_said_with_the_number() {
-    // The driver does not say where the arm stands.
+    // The driver does not report where the arm is.
     let mut watch = watch(&hello(ArmKind::Ur5e));
     add_rest(&mut watch, &state(ArmKind::Ur5e, RESTS[0], 0.0), 0.0);
     let &ChainPlacement::Foreign { distance_m, angle_rad } = watch.placement() else {
@@ -107,7 +107,7 @@ fn a_flange_that_is_elsewhere_than_the_chain_has_it_is_said_with_the_number() {
     let computed = ArmKind::Ur5e.arm().forward(&RESTS[0]).unwrap();
     let expected = computed.distance_to(&Pose::from_isometry(base_from_arm() * computed.isometry()));
     assert!((distance_m - expected.0).abs() < 1e-9 && (angle_rad - expected.1).abs() < 1e-9);
-    // It stays so: nobody drives by a chain that once was another one.
+    // It stays so: a chain that was wrong once is never used to drive.
     add_rest(&mut watch, &state(ArmKind::Ur5e, RESTS[1], 0.0), 5.0);
     assert!(matches!(watch.placement(), ChainPlacement::Foreign { .. }));
 }
@@ -136,7 +136,7 @@ fn without_a_flange_places_turned_about_two_axes_show_where_the_chain_stands() {
     assert!((distance_m - 0.05).abs() < 1e-9, "{distance_m}");
 }
 
-/// All places turned about the axis of the first joint: where along and about it the chain stands is not reported.
+/// All places turned about the axis of the first joint: the chain's place along and about it is not determined.
 #[test]
 fn turns_about_one_axis_show_nothing() {
     let mut watch = watch(&hello(ArmKind::Ur5e));
@@ -160,7 +160,7 @@ fn the_chain_of_another_arm_is_never_known() {
     assert!(matches!(watch.placement(), ChainPlacement::Foreign { .. }), "{:?}", watch.placement());
 }
 
-/// A tip that is computed from the joints agrees with them whatever they are, also where the arm stands elsewhere.
+/// A tip that is computed from the joints agrees with them whatever they are, also where the arm is elsewhere.
 #[test]
 fn joints_alone_give_the_tip_of_the_chain() {
     let hello = Hello { base_from_arm: Some(message(base_from_arm())), ..hello(ArmKind::Ur5e) };

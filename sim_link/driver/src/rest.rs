@@ -1,12 +1,12 @@
-//! Whether an arm is at rest, by what its states say and by nothing else: a controller that says `done` may have been asked by another
-//! program in the meantime, or mean that it has read the command.
+//! Whether an arm is at rest, by its states only: a controller that reports `done` may have been commanded by another program in
+//! the meantime, or mean that it has read the command.
 
 use handeye_arm::JointValues;
 use handeye_geometry::frames::{Base, Pose, Tip};
 
-/// For how long an arm that stands has not moved \[s\]: two states at the lowest rate of the protocol.
+/// How long an arm at rest has not moved \[s\]: two states at the lowest rate of the protocol.
 pub const REST_S: f64 = 0.2;
-/// By how much joints [rad, m] and tip [m, rad] of an arm that stands differ from state to state at the most: noise of encoders.
+/// Largest difference of joints [rad, m] and tip [m, rad] of an arm at rest from state to state: noise of encoders.
 const REST: f64 = 5e-4;
 
 /// An arm at an instant.
@@ -23,25 +23,25 @@ pub struct Place {
 /// How an arm moved.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Moved {
-    /// Most of all joints this one.
+    /// The joint that moved most.
     Joint {
         /// Counted from 0 at the base.
         index: usize,
-        /// From where [rad, or m].
+        /// Start [rad, or m].
         from: f64,
-        /// To where.
+        /// End.
         to: f64,
     },
-    /// Its tip; of an arm whose joints are not known.
+    /// The tip, for an arm whose joints are not known.
     Tip {
         /// How far \[m\].
         distance_m: f64,
-        /// By which angle \[rad\].
+        /// Rotation \[rad\].
         angle_rad: f64,
     },
 }
 
-/// Watches it from state to state.
+/// Watches an arm from state to state.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct RestWatch {
     first: Option<Place>,
@@ -51,7 +51,7 @@ pub struct RestWatch {
 }
 
 impl RestWatch {
-    /// Takes in a state; whether the arm has stood for [`REST_S`].
+    /// Takes in a state; returns whether the arm has been at rest for [`REST_S`].
     pub fn take(&mut self, place: Place) -> bool {
         self.first.get_or_insert(place);
         self.newest = Some(place);
@@ -62,7 +62,7 @@ impl RestWatch {
         place.stamp_s - since.stamp_s >= REST_S
     }
 
-    /// The arm is known to move: it has not stood before this.
+    /// The arm is known to move: it was not at rest before this.
     pub(crate) fn restart(&mut self) {
         self.since = None;
     }
@@ -93,7 +93,7 @@ impl RestWatch {
     }
 }
 
-/// By the joints, or by the tip where they are not known.
+/// Compares the joints, or the tip where they are not known.
 fn differs(a: &Place, b: &Place) -> bool {
     match (&a.joints, &b.joints) {
         (Some(a), Some(b)) if !a.is_empty() => a.len() != b.len() || a.iter().zip(b).any(|(a, b)| (a - b).abs() > REST),

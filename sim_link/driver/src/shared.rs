@@ -16,10 +16,10 @@ use super::wire::{Excerpt, Incoming, WireError};
 pub const QUEUE: usize = 64;
 /// Requests that may be open at a time; the workbench makes a handful.
 const MOST_REQUESTS: usize = 64;
-/// How often a cancel token is looked at.
+/// Interval at which a cancel token is checked.
 const POLL: Duration = Duration::from_millis(20);
 
-/// What the thread that writes is given.
+/// Commands for the thread that writes.
 #[derive(Debug)]
 pub enum Out {
     /// A message.
@@ -30,7 +30,7 @@ pub enum Out {
     Bye,
 }
 
-/// A connection to one driver, as its threads and its users have it.
+/// A connection to one driver, shared by its threads and its users.
 #[derive(Debug)]
 pub struct Shared {
     /// Command or address, for messages.
@@ -70,7 +70,8 @@ impl Shared {
         });
     }
 
-    /// Waits until `ready` gives something, at most so long; `None` when the time is over or `cancel` was raised.
+    /// Waits until `ready` gives something, at most for `patience`; `None` when the time is over or `cancel` was
+    /// raised.
     ///
     /// # Errors
     /// [`DriverError::Gone`] once the connection is over.
@@ -98,13 +99,13 @@ impl Shared {
         }
     }
 
-    /// Waits until nothing more is read, at most so long; whether that is so.
+    /// Waits until nothing more is read, at most for `patience`; returns whether that is so.
     pub fn wait_for_output(&self, patience: Duration) -> bool {
         let waited = self.changed.wait_timeout_while(self.lock(), patience, |inner| !inner.read_up.output);
         waited.unwrap_or_else(PoisonError::into_inner).0.read_up.output
     }
 
-    /// Waits until the driver has ended, at most so long.
+    /// Waits until the driver has ended, at most for `patience`.
     pub fn wait_for_burial(&self, patience: Duration) {
         let waited = self.changed.wait_timeout_while(self.lock(), patience, |inner| inner.burial.is_none());
         drop(waited.unwrap_or_else(PoisonError::into_inner));
@@ -161,7 +162,8 @@ impl Shared {
     pub fn request(&self, message: impl FnOnce(u64) -> ToDriver) -> Result<u64, DriverError> {
         let id = {
             let mut inner = self.lock();
-            // What nobody waits for any longer makes room; a driver that answers nothing holds no more than this.
+            // Requests that nobody waits for any longer make room; a driver that never answers uses no more memory than
+            // this.
             while inner.requests.len() >= MOST_REQUESTS {
                 inner.requests.pop_first();
             }
@@ -177,7 +179,7 @@ impl Shared {
     /// Takes in a message.
     ///
     /// # Errors
-    /// [`WireError`] for one that does not belong where it stands.
+    /// [`WireError`] for a message in the wrong place.
     pub fn take(&self, incoming: Incoming, arrived_s: f64) -> Result<(), WireError> {
         let Incoming { number, line, message, bytes } = incoming;
         if let FromDriver::Preparing(preparing) = &message {

@@ -1,4 +1,4 @@
-//! Which driver: a command or an address.
+//! The address of a driver: a command or a network address.
 
 use std::fmt;
 use std::str::FromStr;
@@ -22,13 +22,13 @@ pub enum BadSpec {
     /// A quote without its end.
     #[error("{text}: a quote is not closed")]
     Quote {
-        /// What was given.
+        /// The text as given.
         text: String,
     },
     /// No port.
     #[error("{text}: tcp://HOST:PORT needs host and port, for example tcp://127.0.0.1:7000")]
     Address {
-        /// What was given.
+        /// The text as given.
         text: String,
     },
 }

@@ -1,27 +1,27 @@
-//! When drivers that are gone are started again, and when no more: a program that ends at once each time would otherwise keep
-//! the machine busy and say nothing.
+//! When drivers that are gone are started again, and when no longer: a program that always ends at once would otherwise keep
+//! the machine busy without any report.
 
 use std::time::Duration;
 
-/// Who lives so long \[s\] works: what ends it later is another trouble than what ended it before.
+/// A driver that runs for this long \[s\] works: what ends it later is another fault than before.
 const STEADY_S: f64 = 10.0;
-/// Pauses \[s\] after one, two, … starts in a row that came to nothing. The first is a person's who corrects a cable; the last one
-/// does not bother a controller that boots for minutes.
+/// Pauses \[s\] after one, two, … failed starts in a row. The first is for a user who corrects a cable; the last does not disturb
+/// a controller that boots for minutes.
 const PAUSES_S: [f64; 6] = [0.5, 1.0, 2.0, 4.0, 8.0, 15.0];
-/// The longest pause \[s\] where nobody listens at an address: knocking costs nothing, and a person who starts the driver by hand
-/// waits for it.
+/// The longest pause \[s\] where no driver listens at an address: a connection attempt costs little, and a person who starts the
+/// driver by hand waits for it.
 const KNOCKING_S: f64 = 2.0;
-/// So many starts in a row of drivers that never worked: more of the same would not help.
+/// Most starts in a row of drivers that never worked: more would not help.
 const MOST_AT_FIRST: u32 = 6;
-/// So many starts in a row of drivers that have worked, half an hour: a controller that is switched off comes back.
+/// Most starts in a row of drivers that have worked, half an hour: a controller that is switched off comes back.
 const MOST_LATER: u32 = 120;
 
-/// What a start came to nothing by.
+/// Why a start failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Failure {
     /// The driver ended, or did not become ready.
     Ended,
-    /// Nobody listens at its address: nothing was started.
+    /// No driver listens at its address: nothing was started.
     Nobody,
     /// It cannot work before a person changes something.
     Hopeless,
@@ -41,9 +41,9 @@ pub enum Permit {
 /// Counts starts. No clock: times are given, in seconds on any steady one.
 #[derive(Debug, Default)]
 pub struct Starts {
-    /// Starts in a row that came to nothing.
+    /// Starts in a row that failed.
     failures: u32,
-    /// Times in a row that nobody listened; none of them is a start.
+    /// Times in a row that no driver listened; none of them is a start.
     knocks: u32,
     began_s: Option<f64>,
     has_worked: bool,
@@ -52,7 +52,7 @@ pub struct Starts {
 }
 
 impl Starts {
-    /// How many tries in a row came to nothing.
+    /// Number of attempts in a row that failed.
     pub fn tries(&self) -> u32 {
         self.failures.saturating_add(self.knocks)
     }
@@ -72,8 +72,7 @@ impl Starts {
         self.not_before_s = None;
     }
 
-    /// What had begun is gone. It is started again at once where it had worked for a while, or where no start before came to
-    /// nothing.
+    /// What had begun is gone. It is started again at once where it had worked for a while, or where no start before failed.
     pub fn ended(&mut self, now_s: f64) {
         let Some(began_s) = self.began_s.take() else { return };
         if now_s - began_s >= STEADY_S {
@@ -86,12 +85,12 @@ impl Starts {
         }
     }
 
-    /// A start came to nothing.
+    /// A start failed.
     pub fn failed(&mut self, now_s: f64, why: Failure) {
         self.count(now_s, why);
     }
 
-    /// A person asks for it.
+    /// The user requests a start.
     pub fn again(&mut self) {
         (self.failures, self.knocks, self.not_before_s, self.is_over) = (0, 0, None, false);
     }
@@ -114,8 +113,8 @@ impl Starts {
 mod tests {
     use super::*;
 
-    /// Starts whenever it is permitted, at a driver that lives for so long each time: how many starts there are, and how long it
-    /// takes until there are no more.
+    /// Starts whenever it is permitted, with a driver that runs for `lives_s` each time: how many starts there are, and how long
+    /// it takes until there are no more.
     fn tried(starts: &mut Starts, lives_s: f64, most: u32) -> (u32, f64) {
         let (mut now_s, mut count) = (0.0, 0);
         while count < most {

@@ -10,20 +10,20 @@ use super::limits::STATES_APART_S;
 use super::message::{BadMessage, PoseMessage, StateMessage};
 use super::rest::Place;
 
-/// For how long states are kept \[s\]: longer than an image takes from its exposure to here.
+/// For how long states are kept \[s\]: longer than the latency of an image.
 const MEMORY_S: f64 = 10.0;
 /// Most states that are kept: those of 8 s at the highest rate of the protocol.
 const MOST: usize = 4096;
 
-/// No joint is farther from its zero than this [rad, m], and no tip from its base \[m\]: what says so is broken.
+/// No joint is farther from its zero than this [rad, m], and no tip from its base \[m\]: a state beyond is faulty.
 const FARTHEST_JOINT: f64 = 1e3;
 const FARTHEST_TIP_M: f64 = 100.0;
-/// A tip is nowhere else at once by more than this \[m\]: to the other side of the largest arms, as when a simulator is reset, or by the
+/// A tip does not jump by more than this \[m\]: to the other side of the largest arms, as when a simulator is reset, or by the
 /// length of a tool that is set. From there on it is not faster than twice the fastest arms \[m/s\].
 const MOST_JUMP_M: f64 = 5.0;
 const FASTEST_TIP_M_S: f64 = 20.0;
 
-/// The robot as a state says it, on the driver's clock.
+/// The robot by a state, on the driver's clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
     /// The driver's stamp \[s\].
@@ -32,7 +32,7 @@ pub struct Reading {
     pub base_from_tip: Pose<Base, Tip>,
     /// A value for each joint, rad or m.
     pub joints: Option<JointValues>,
-    /// Whether the controller moves the arm, where it says so.
+    /// Whether the controller moves the arm, where it reports that.
     pub moving: Option<bool>,
 }
 
@@ -43,11 +43,11 @@ pub struct RobotAt {
     pub base_from_tip: Pose<Base, Tip>,
     /// A value for each joint, rad or m.
     pub joints: Option<JointValues>,
-    /// Whether either state says that the arm moved; `None` where the driver does not say.
+    /// Whether either state reports that the arm moved; `None` where the driver does not report it.
     pub moving: Option<bool>,
     /// Speed of the tip between the two states \[m/s\].
     pub speed_m_s: f64,
-    /// How fast it turned \[rad/s\].
+    /// Rotation rate of the tip \[rad/s\].
     pub turn_rad_s: f64,
 }
 
@@ -88,8 +88,8 @@ impl Reading {
     /// Reads a state: `base_from_tip`, or the flange with its tool, or the joints of a chain that is known.
     ///
     /// # Errors
-    /// [`BadMessage`] for a pose that is none, a number of joints other than `joints`, places where no arm is, and where nothing
-    /// says where the tip is.
+    /// [`BadMessage`] for an invalid pose, a number of joints other than `joints`, a place that no arm can have, and a state
+    /// without the tip's pose.
     pub(crate) fn of(state: &StateMessage, joints: usize, arm: Option<&Arm>) -> Result<Self, BadMessage> {
         if let Some(values) = &state.joints_rad
             && values.len() != joints

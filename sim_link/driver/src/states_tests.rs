@@ -118,7 +118,7 @@ fn places_where_no_arm_is_and_tips_that_jump_are_named() {
 
     let mut states = States::default();
     states.add(reading(1.0, 0.4, 0.0)).unwrap();
-    // A simulator that was reset, and a gap in which the arm went.
+    // A simulator that was reset, and a gap in which the arm moved.
     states.add(reading(1.02, -2.0, 0.0)).unwrap();
     let jump = states.add(reading(1.04, 8.0, 0.0)).unwrap_err().to_string();
     assert!(jump.contains("10.0 m from where it was 0.020 s before"), "{jump}");

@@ -14,7 +14,7 @@ use super::message::{LogLevel, ToDriver};
 use super::shared::{DriverExit, Inner, Out, Shared};
 use super::wire::MessageReader;
 
-/// How long the rest of what a driver that has ended said may take to be read.
+/// How long reading the rest of the output of a driver that has ended may take.
 const LAST_WORDS: Duration = Duration::from_millis(300);
 /// Pings that may be without an answer: those of the silence that is allowed, with room.
 const MOST_PINGS: usize = 64;
@@ -119,7 +119,7 @@ pub fn watch(shared: &Arc<Shared>, mut end: LinkEnd) {
 /// Why the output has ended, or the process.
 fn how_ended(shared: &Shared, end: &mut LinkEnd) -> Ending {
     let status = end.ended_within(LAST_WORDS);
-    // What it said last is often why.
+    // Its last lines often give the reason.
     let read_up = |inner: &mut Inner| (inner.read_up.errors && inner.read_up.output).then_some(());
     if status.is_some()
         && let Err(DriverError::Gone { why, .. }) = shared.wait(LAST_WORDS, None, read_up)

@@ -11,19 +11,19 @@ pub const MAX_LINE: usize = 65_536;
 pub(crate) const MAX_BYTES: u64 = 67_108_864;
 /// Bytes are taken in pieces of this size, so that what is promised and does not come takes no memory.
 const PIECE: u64 = 1 << 20;
-/// How much of a line is shown.
+/// Characters of a line that are shown.
 const SHOWN: usize = 160;
 
 /// A message as it came.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Incoming {
-    /// Which line of the conversation it was, counted from 1.
+    /// Number of the line in the conversation, counted from 1.
     pub number: u64,
     /// The line, for messages about it.
     pub line: String,
-    /// What it says.
+    /// The message.
     pub message: FromDriver,
-    /// What followed it; nothing after a message of an unknown type, where bytes are passed over.
+    /// Bytes that followed it; none after a message of an unknown type, where bytes are skipped.
     pub bytes: Vec<u8>,
 }
 
@@ -31,9 +31,9 @@ pub struct Incoming {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 #[error("message {number}: {problem}: {excerpt}")]
 pub struct WireError {
-    /// Which line of the conversation it was, counted from 1.
+    /// Number of the line in the conversation, counted from 1.
     pub number: u64,
-    /// How the line begins.
+    /// Beginning of the line.
     pub excerpt: Excerpt,
     /// What is wrong.
     pub problem: WireProblem,
@@ -52,9 +52,9 @@ pub enum WireProblem {
     /// The output ended within the bytes that follow a line.
     #[error("the output ended after {got} of {need} bytes")]
     CutBytes {
-        /// What came.
+        /// Bytes received.
         got: u64,
-        /// What was promised.
+        /// Bytes announced.
         need: u64,
     },
     #[error("not UTF-8")]
@@ -63,7 +63,7 @@ pub enum WireProblem {
     /// No message where one has to be, behind the bytes of another.
     #[error("{what}: it follows the {bytes} bytes of the message before, of which there may be more or fewer")]
     AfterBytes {
-        /// How many bytes were taken.
+        /// Number of bytes that were taken.
         bytes: u64,
         /// What is wrong with what follows.
         what: Box<WireProblem>,
@@ -71,13 +71,13 @@ pub enum WireProblem {
     /// More bytes than [`MAX_BYTES`].
     #[error("{got} bytes are to follow, at most {MAX_BYTES}")]
     TooManyBytes {
-        /// What was promised.
+        /// Bytes announced.
         got: u64,
     },
     /// The message itself.
     #[error(transparent)]
     Message(#[from] BadMessage),
-    /// It does not belong where it stands in the conversation, or its bytes are no image.
+    /// A message in the wrong place of the conversation, or bytes that are not an image.
     #[error("{0}")]
     Conversation(String),
     /// The system cannot read.
@@ -90,7 +90,7 @@ pub enum WireProblem {
 pub struct Excerpt(String);
 
 impl Excerpt {
-    /// Of the bytes of a line. What is no text becomes �.
+    /// Excerpt of the bytes of a line. Bytes that are not UTF-8 become �.
     pub(crate) fn of(line: &[u8]) -> Self {
         let mut shown = String::new();
         for chunk in line.trim_ascii().utf8_chunks() {
@@ -116,13 +116,13 @@ impl fmt::Display for Excerpt {
 
 handeye_wording::plain_values!(Excerpt);
 
-/// Reads the messages of a driver. After an error there is no way to tell where the next message begins.
+/// Reads the messages of a driver. After an error it is not known where the next message begins.
 #[derive(Debug)]
 pub(crate) struct MessageReader<R> {
     source: R,
     number: u64,
     line: Vec<u8>,
-    /// How many bytes followed the line before.
+    /// Number of bytes that followed the previous line.
     bytes_before: u64,
 }
 

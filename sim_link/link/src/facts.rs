@@ -1,4 +1,4 @@
-//! What a cell says of itself and of its robot.
+//! Facts that a cell reports about itself and its robot.
 
 use handeye_arm::{JointKind, JointValues};
 use handeye_coppeliasim::cell::{ArmKinematics, CellInfo, CellJoint, GroundTruth};
@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 pub struct CellFacts {
     /// The joints from the base up.
     pub joints: Vec<JointFacts>,
-    /// What the camera's settings say, without its lens, or a driver knows: good enough to draw with before there is a
-    /// calibration.
+    /// Intrinsics from the camera's settings, without distortion, or from a driver: good enough for drawing before
+    /// there is a calibration.
     pub nominal_intrinsics: Option<Intrinsics>,
     /// The arm as it was measured. Where that is not known, goals are not checked before anything moves, and it is not
     /// drawn.
@@ -30,12 +30,12 @@ pub struct CellFacts {
     pub poses_are_typed: bool,
 }
 
-/// Why the chain of joints that a driver names is not driven by.
+/// Why the chain of joints that a driver names is not used.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum ArmDoubt {
-    /// The arm has not stood at enough places to tell where the chain stands and what tool it carries.
+    /// The arm has not been at rest at enough places to determine the place of the chain and its tool.
     Open,
-    /// By the joints the tip or the flange is not where the driver reports it.
+    /// The tip or the flange computed from the joints is not where the driver reports it.
     Foreign {
         /// Distance between both \[m\].
         distance_m: f64,
@@ -44,16 +44,16 @@ pub enum ArmDoubt {
     },
 }
 
-/// How an arm may be moved from the workbench.
+/// How the workbench may move an arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Moves {
     /// In every way: a simulation.
     Freely,
     /// To goals and in steps, once a person allows it: a robot behind a driver.
     OnceArmed {
-        /// To values of the joints.
+        /// Goals as joint values are possible.
         joints: bool,
-        /// To poses of the tip.
+        /// Goals as poses of the tip are possible.
         tip: bool,
     },
     /// Not at all.
@@ -61,7 +61,7 @@ pub enum Moves {
 }
 
 impl CellFacts {
-    /// By what the cell says of itself.
+    /// From the information of the cell.
     pub(crate) fn new(info: &CellInfo, arm: Option<&ArmKinematics>, truth: Option<&GroundTruth>) -> Self {
         Self {
             joints: info.joints.iter().map(JointFacts::from).collect(),
@@ -79,9 +79,9 @@ impl CellFacts {
 /// A joint of the arm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct JointFacts {
-    /// How it moves.
+    /// Revolute or prismatic.
     pub kind: JointKind,
-    /// How far \[rad, or m of a prismatic joint\]; `None` for one that has no end.
+    /// Range \[rad, or m of a prismatic joint\]; `None` for a cyclic joint.
     pub range: Option<[f64; 2]>,
 }
 
@@ -126,7 +126,7 @@ pub enum Simulation {
 pub struct RobotState {
     /// The tip as the controller reports it.
     pub base_from_tip: Pose<Base, Tip>,
-    /// Positions of the joints from the base up \[rad, or m of a prismatic joint\]; none where they are not stated.
+    /// Positions of the joints from the base up \[rad, or m of a prismatic joint\]; empty where they are not reported.
     pub joints_rad: JointValues,
     /// Simulated time \[s\]; of a robot behind a driver, time of the workbench.
     pub sim_time_s: f64,

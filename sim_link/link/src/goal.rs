@@ -1,4 +1,4 @@
-//! Where an arm is asked to go, and what came of it.
+//! Goals of an arm's motions, and their outcome.
 
 use handeye_arm::{JointKind, JointValues};
 use handeye_geometry::frames::{Base, Pose, Tip};
@@ -21,7 +21,7 @@ pub enum MotionOutcome {
     Arrived,
     /// It was not begun, and this is why.
     Refused(Text),
-    /// The arm stands, and not at its goal, which may be out of reach.
+    /// The arm is at rest, but not at its goal, which may be out of reach.
     Unreached(Text),
     /// It was stopped on its way.
     Stopped,
@@ -32,7 +32,7 @@ pub enum MotionOutcome {
 }
 
 impl MotionOutcome {
-    /// Why the arm is not at its goal, where there is a reason to say.
+    /// Why the arm is not at its goal, where there is a reason to report.
     pub fn why(&self) -> Option<&Text> {
         match self {
             Self::Refused(why) | Self::Unreached(why) | Self::Failed(why) | Self::Held(why) => Some(why),
@@ -60,16 +60,16 @@ impl Axis {
 /// Along which axes the tip is jogged.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum JogFrame {
-    /// Those of the robot's base.
+    /// The axes of the robot's base.
     #[default]
     Base,
-    /// Those of the tip.
+    /// The axes of the tip.
     Tip,
-    /// Those of the camera, by the current calibration or else by what the cell says of it; turns are about its centre.
+    /// The axes of the camera, by the current calibration or else by the cell's own value; turns are about its centre.
     Camera,
 }
 
-/// One direction of jogging; `forward` tells the two ways apart.
+/// One direction of jogging; `forward` selects the sense.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Jog {
     /// One joint, counted from 0 at the base.
@@ -81,26 +81,26 @@ pub enum Jog {
     },
     /// The tip, along an axis.
     Translate {
-        /// Whose axis.
+        /// Frame of the axis.
         frame: JogFrame,
         /// The axis, x, y or z.
         axis: Axis,
-        /// Which way.
+        /// Sense.
         forward: bool,
     },
     /// The tip, about an axis; right-handed when forward.
     Rotate {
-        /// Whose axis.
+        /// Frame of the axis.
         frame: JogFrame,
         /// The axis, x, y or z.
         axis: Axis,
-        /// Which way.
+        /// Sense.
         forward: bool,
     },
 }
 
 impl Jog {
-    /// Whether it goes along something, in metres, and not about it, in radians; `kind` says how a joint moves.
+    /// Whether it is a length, in metres, and not an angle, in radians; `kind` gives the kind of a joint.
     pub fn is_length(&self, kind: impl Fn(usize) -> JointKind) -> bool {
         match *self {
             Self::Translate { .. } => true,

@@ -1,4 +1,4 @@
-//! How fast the arm moves when nobody says otherwise.
+//! Default speeds of the arm.
 
 use handeye_arm::JointKind;
 use handeye_coppeliasim::MotionLimits;
@@ -41,8 +41,8 @@ pub fn of_tip(limits: &taught_poses::MotionLimits, share: f64) -> MotionLimits {
     MotionLimits::uniform(4, speed, acceleration, jerk)
 }
 
-/// Of revolute joints at a share of the speed. The velocity alone would not do, because short motions end before they are as
-/// fast as they may be.
+/// Pace of revolute joints at a share of the speed. The velocity alone would not suffice, because short motions end before
+/// they reach it.
 pub fn pace(limits: &taught_poses::MotionLimits, share: f64) -> Pace {
     Pace { speed: limits.joint_velocity, acceleration: limits.joint_acceleration, jerk: limits.joint_jerk }
         .slower(share)

@@ -1,10 +1,10 @@
-//! How an arm moved, in words.
+//! How an arm moved, as text.
 
 use handeye_arm::JointKind;
 use handeye_driver::Moved;
 use handeye_wording::{Text, text};
 
-/// How an arm moved, for people.
+/// How an arm moved, as text for people.
 pub fn moved_text(moved: &Moved, kind: impl Fn(usize) -> Option<JointKind>) -> Text {
     match *moved {
         Moved::Joint { index, from, to } => {

@@ -1,4 +1,4 @@
-//! What can be asked of a cell.
+//! The interface to a cell.
 
 use std::time::Duration;
 
@@ -26,17 +26,17 @@ pub enum PortError {
     Lost(Text),
     /// The cell answered no.
     Refused(Text),
-    /// The simulation stands still because another client holds it.
+    /// The simulation does not advance because another client holds it.
     Held(Text),
     /// It cannot work before the user changes something.
     Hopeless(Text),
-    /// As [`Self::Lost`], where the cell itself is not to be tried more often than this.
+    /// As [`Self::Lost`], with a minimum pause before the next attempt.
     Later {
-        /// Why there is none.
+        /// Why there is no connection.
         why: Text,
-        /// How many tries in a row came to nothing.
+        /// Number of failed attempts in a row.
         tries: u32,
-        /// How long until the next.
+        /// Time until the next attempt.
         pause: Duration,
     },
     /// The user wants that it is not tried.
@@ -59,15 +59,15 @@ impl PortError {
 
 /// A connection that has just been made.
 pub struct Connected<Port> {
-    /// To make calls.
+    /// The port for calls.
     pub port: Port,
-    /// Where the server is.
+    /// Address of the server.
     pub address: String,
-    /// What it is, for example `CoppeliaSim 4.10.0`.
+    /// Name of the server, for example `CoppeliaSim 4.10.0`.
     pub server: String,
 }
 
-/// A cell, however it is reached. It makes connections, each for a thread of its own; all calls block.
+/// A cell, however it is reached. It makes connections, each for its own thread; all calls block.
 pub trait Cell: Send + Sync {
     /// A connection for joints, tip, simulation and stop.
     ///
@@ -87,8 +87,8 @@ pub trait Cell: Send + Sync {
     /// As [`Self::control`].
     fn motion(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn MotionPort>>, PortError>;
 
-    /// The user wants no more tries: from now on a connection that is not there is [`PortError::Rests`], and a try under way is
-    /// given up. Waits for nothing. Only where a try starts a program is there reason to.
+    /// The user wants no more attempts: from now on a missing connection is [`PortError::Rests`], and an attempt under way is
+    /// given up. Does not block. Only needed where an attempt starts a program.
     fn rest(&self) {}
 
     /// The user wants it to be tried now. Waits for nothing.
@@ -97,13 +97,13 @@ pub trait Cell: Send + Sync {
 
 /// The robot and the simulation.
 pub trait ControlPort: Send {
-    /// What does not change while the connection lasts, or hardly.
+    /// Facts that do not change, or hardly, while the connection lasts.
     ///
     /// # Errors
     /// [`PortError`].
     fn facts(&mut self) -> Result<CellFacts, PortError>;
 
-    /// Whether the facts are others than when they were asked for last.
+    /// Whether the facts differ from those of the last call of `facts`.
     fn facts_differ(&mut self) -> bool {
         false
     }
@@ -120,7 +120,7 @@ pub trait ControlPort: Send {
     /// [`PortError`].
     fn start_simulation(&mut self) -> Result<(), PortError>;
 
-    /// Ends the simulation, and waits until it has ended. Nothing where there is none.
+    /// Ends the simulation, and waits until it has ended. Does nothing where there is none.
     ///
     /// # Errors
     /// [`PortError`].
@@ -128,7 +128,7 @@ pub trait ControlPort: Send {
         Ok(())
     }
 
-    /// Where the scene of a simulation has its board; `None` where that is not known.
+    /// Pose of the board in the scene of a simulation; `None` where that is not known.
     ///
     /// # Errors
     /// [`PortError`].
@@ -178,37 +178,37 @@ pub trait ControlPort: Send {
         Err(PortError::Refused(text!("The robot reports its pose by itself")))
     }
 
-    /// What the cell has said for people since the last call.
+    /// Log lines of the cell since the last call.
     fn heard(&mut self) -> Vec<(LogLevel, String)> {
         Vec::new()
     }
 }
 
-/// A jog that is asked for: for as long as a button is held, or by a step.
+/// A requested jog: for as long as a button is held, or by a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JogRequest {
-    /// Which way.
+    /// Direction of the jog.
     pub jog: Jog,
-    /// Where the camera is, for jogs along and about its axes.
+    /// Pose of the camera, for jogs along and about its axes.
     pub tip_from_camera: Option<Pose<Tip, Camera>>,
     /// Share of the fastest speed, over 0 and up to 1.
     pub speed: f64,
 }
 
-/// Poses that are asked for to look at the board from.
+/// A request for poses from which the board is seen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewsRequest {
-    /// What is looked at, and with what.
+    /// The board, and the camera that looks at it.
     pub board: BoardInView,
-    /// Where it was looked at from already: the poses are to be others.
+    /// Poses from which it was seen already: the new ones are to differ.
     pub taken: Vec<Pose<Base, Tip>>,
-    /// How many are wanted; there may be fewer.
+    /// Number of poses requested; there may be fewer.
     pub count: usize,
-    /// Of the views that are compared: the same question gets the same answer.
+    /// Seed of the candidate views: the same request gets the same answer.
     pub seed: u64,
 }
 
-/// Whether an arm can go along with a board from where it is.
+/// Whether an arm can follow a board from where it is.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Room {
     /// It can.
@@ -219,7 +219,7 @@ pub enum Room {
     Nowhere(Text),
 }
 
-/// What moves the arm.
+/// The interface to the motions of the arm.
 pub trait MotionPort: Send {
     /// As [`ControlPort::renew`].
     ///
@@ -238,7 +238,7 @@ pub trait MotionPort: Send {
         Ok(())
     }
 
-    /// Lets simulated time advance to the next pass. Nothing where it is not simulated.
+    /// Lets simulated time advance to the next pass. Does nothing where it is not simulated.
     ///
     /// # Errors
     /// [`PortError`], [`PortError::Held`] among them.
@@ -250,7 +250,7 @@ pub trait MotionPort: Send {
     /// [`Self::keep_out`].
     fn plan_by(&mut self, _kinematics: &ArmKinematics) {}
 
-    /// The fastest that a simulated arm moves from now on; a robot behind a driver has limits of its own.
+    /// The fastest that a simulated arm moves from now on; a robot behind a driver has its own limits.
     fn limit(&mut self, _limits: &MotionLimits) {}
 
     /// Looks whether the cell is there, without asking it for anything.
@@ -259,8 +259,8 @@ pub trait MotionPort: Send {
     /// [`PortError::Lost`] when it has gone.
     fn check(&mut self) -> Result<(), PortError>;
 
-    /// Moves to a goal, at a share of the fastest speed, and returns when the arm stands: there, or where `cancel`
-    /// brought it to rest.
+    /// Moves to a goal, at a share of the fastest speed, and returns when the arm is at rest: there, or where `cancel`
+    /// stopped it.
     ///
     /// # Errors
     /// [`PortError::Lost`]; everything else is an outcome.
@@ -273,8 +273,8 @@ pub trait MotionPort: Send {
     fn jog_step(&mut self, request: &JogRequest, length: f64, cancel: &CancelToken)
     -> Result<MotionOutcome, PortError>;
 
-    /// Jogs for as long as `held` gives a share of the fastest speed, and returns when the arm stands; with the reason
-    /// when it ended by itself, or did not begin.
+    /// Jogs for as long as `held` gives a share of the fastest speed, and returns when the arm is at rest; with the
+    /// reason when it ended by itself, or did not begin.
     ///
     /// # Errors
     /// As [`Self::move_to`].
@@ -292,21 +292,21 @@ pub trait MotionPort: Send {
     /// As [`Self::move_to`].
     fn views(&mut self, request: &ViewsRequest) -> Result<Result<Vec<JointValues>, Text>, PortError>;
 
-    /// The arm as guided capture drives it at a share of its highest speed, where it stands; or why it cannot be. Nothing moves.
+    /// The arm as guided capture drives it at a share of its highest speed, where it is; or why that is not possible. Nothing
+    /// moves.
     ///
     /// # Errors
     /// As [`Self::move_to`].
     fn robot(&mut self, speed: f64) -> Result<Result<Robot, Text>, PortError>;
 
-    /// Has the arm keep out of these, too, from its next motion on. Gives what the cell says stands around; or why nothing can be
-    /// kept out of.
+    /// Makes the arm avoid these, too, from its next motion on. Returns the obstacles of the cell; or why none can be avoided.
     ///
     /// # Errors
     /// The reason, where the kinematics is not known.
     fn keep_out(&mut self, keep_out: &Surroundings) -> Result<Surroundings, Text>;
 
-    /// Leads the tip where `wish` wants it, pass by pass, and returns when the arm stands: how that ended, or why it was not
-    /// begun or failed.
+    /// Moves the tip where `requested` wants it, pass by pass, and returns when the arm is at rest: how that ended, or why
+    /// it was not begun or failed.
     ///
     /// # Errors
     /// As [`Self::move_to`].
@@ -331,26 +331,26 @@ pub struct RawFrame {
     pub base_from_tip: Option<Pose<Base, Tip>>,
     /// Why that is not known.
     pub no_pose: Option<Text>,
-    /// The joints at that instant \[rad\]; none where the robot does not report them.
+    /// The joints at that instant \[rad\]; empty where the robot does not report them.
     pub joints_rad: JointValues,
-    /// Where the board was at that instant, if the cell publishes it.
+    /// Pose of the board at that instant, if the cell publishes it.
     pub base_from_target_true: Option<Pose<Base, Target>>,
-    /// How far \[s\] the robot's clock is ahead of the camera's, and how well that is known; where they are two.
+    /// Offset \[s\] of the robot's clock from the camera's, and its uncertainty; where there are two clocks.
     pub clocks: Option<[f64; 2]>,
 }
 
-/// What a camera gives that is asked for its newest images.
+/// Reply of a camera to a request for its newest images.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Newest {
     /// New ones.
     Frame(Box<RawFrame>),
-    /// The camera answers that time stands still: it has none but those that were seen.
+    /// The camera reports that simulated time does not advance: there are no newer images.
     Same,
     /// It has not answered yet.
     Awaited,
 }
 
-/// What images are fetched by.
+/// The interface to the images.
 pub trait CameraPort: Send {
     /// The newest images of another instant than the last ones, whose time was `seen_s`. Waits no longer than a tenth of a
     /// second for them.

@@ -13,10 +13,10 @@ const MAX_RATE_RAD_S: f64 = 20.0;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BoardPath {
-    /// It stands.
+    /// It is at rest.
     #[default]
     Still,
-    /// A circle in its plane, anticlockwise for who looks at the print.
+    /// A circle in its plane, anticlockwise when looking at the print.
     Circle,
     /// A figure of eight in its plane, lying on its side.
     FigureEight,
@@ -61,7 +61,7 @@ impl FromStr for BoardPath {
     }
 }
 
-/// How the board moves: along a path around where it stands when the motion begins.
+/// How the board moves: along a path around where it is when the motion begins.
 ///
 /// Every path but [`BoardPath::Step`] begins from rest and without a jump in velocity. The same path, numbers and seed
 /// give the same motion in simulated time, however fast that runs.
@@ -72,10 +72,10 @@ pub struct BoardMotionSpec {
     pub path: BoardPath,
     /// Mean speed of the board's centre along the path, m/s. [`BoardPath::Step`] does not have one.
     pub speed_m_s: f64,
-    /// How far the path reaches: radius of the circle and of the places to jump to, half the width of the figure of
-    /// eight, largest displacement along either side of the sheet of the random walk; metres.
+    /// Extent of the path: radius of the circle and of the places to jump to, half the width of the figure of eight,
+    /// largest displacement along either side of the sheet of the random walk; metres.
     pub size_m: f64,
-    /// Largest angle by which the board is turned on its way, degrees; how is drawn from the seed. 0 for none.
+    /// Largest angle by which the board is turned on its way, degrees; the axes are drawn from the seed. 0 for none.
     pub tilt_deg: f64,
 }
 
@@ -112,10 +112,10 @@ impl BoardMotionSpec {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{name} is {value}, it must be {need}")]
 pub struct OutOfRange {
-    /// Which number.
+    /// The field.
     pub name: &'static str,
     /// The number that was given.
     pub value: f64,
-    /// What it must be.
+    /// The valid range.
     pub need: String,
 }

@@ -70,7 +70,7 @@ impl Course {
         course
     }
 
-    /// Whether it leads nowhere.
+    /// Whether it is at rest.
     pub fn is_still(&self) -> bool {
         self.spec.path == BoardPath::Still
     }

@@ -72,7 +72,7 @@ impl MotionLimits {
     }
 }
 
-/// How the degrees of freedom go together.
+/// Synchronization of the degrees of freedom.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Sync {
     /// On a straight line, where the start allows one; else as [`Sync::Time`].
@@ -113,7 +113,7 @@ pub enum MotionError {
     /// Two lists of numbers do not belong together.
     #[error("{what} has {got} values, the motion has {need} degrees of freedom")]
     WrongLength {
-        /// Which list.
+        /// Name of the list.
         what: &'static str,
         /// Its length.
         got: usize,
@@ -123,7 +123,7 @@ pub enum MotionError {
     /// A limit forbids every motion, or is not a number.
     #[error("{what} of degree of freedom {dof} is {value}: it must be finite and {sign}")]
     BadLimit {
-        /// Which limit.
+        /// Name of the limit.
         what: &'static str,
         /// Degree of freedom, counted from 0.
         dof: usize,
@@ -135,7 +135,7 @@ pub enum MotionError {
     /// A start or goal is not a number.
     #[error("{what} of degree of freedom {dof} is {value}, not a finite number")]
     NotFinite {
-        /// Which list.
+        /// Name of the list.
         what: &'static str,
         /// Degree of freedom, counted from 0.
         dof: usize,
@@ -145,7 +145,7 @@ pub enum MotionError {
     /// The limits admit no profile, for example because the goal's velocity exceeds them.
     #[error("no motion fits these limits: {reason}")]
     NoProfile {
-        /// What the planner said.
+        /// The error of the planner.
         reason: String,
     },
 }

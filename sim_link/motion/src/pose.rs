@@ -29,7 +29,7 @@ pub struct PoseStep {
     pub pose: Isometry3<f64>,
     /// Velocities: `[x, y, z, angle]` without a metric, one number with it.
     pub vel: Vec<f64>,
-    /// Accelerations, likewise.
+    /// Accelerations of the same degrees of freedom.
     pub accel: Vec<f64>,
     /// Whether the goal is reached; the pose is then exactly the goal.
     pub finished: bool,

@@ -15,7 +15,7 @@ pub enum ApiError {
     /// An argument of another type.
     #[error("argument {number} is not {expected}.")]
     WrongType {
-        /// Which, counted from 1.
+        /// Number of the argument, counted from 1.
         number: usize,
         /// What it should be.
         expected: &'static str,
@@ -208,7 +208,7 @@ impl Args {
     }
 }
 
-/// The name in a text that stands for a function of the client.
+/// The name in a text that denotes a function of the client.
 pub fn callback_name(value: &Value) -> Option<String> {
     value.text()?.strip_suffix("@func").map(str::to_owned)
 }
@@ -285,7 +285,7 @@ impl<'a> Fields<'a> {
         self.read(name, Reader::numbers)
     }
 
-    /// A list of numbers of which there must be `count`.
+    /// A list of exactly `count` numbers.
     ///
     /// # Errors
     /// Something else is there.

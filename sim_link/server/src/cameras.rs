@@ -1,4 +1,4 @@
-//! What the vision sensors deliver: drawn when somebody asks, kept until there is something else to see.
+//! Images of the vision sensors: rendered on request, kept until the view changes.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -242,7 +242,7 @@ fn bottom_up(bytes: &[u8], row_bytes: usize) -> Vec<u8> {
     turned
 }
 
-/// A seed of its own for every frame of every sensor. Steele, Lea, Flood 2014, "Fast splittable pseudorandom number
+/// A separate seed for every frame of every sensor. Steele, Lea, Flood 2014, "Fast splittable pseudorandom number
 /// generators", the finaliser of SplitMix64.
 fn frame_seed(seed: u64, handle: Handle, pass: u64) -> u64 {
     let mix = |mut z: u64| {

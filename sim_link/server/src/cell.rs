@@ -35,11 +35,11 @@ pub enum BuildError {
 pub struct Cell {
     /// The objects and the simulation.
     pub world: World,
-    /// Which objects are which.
+    /// Handles of the objects.
     pub stage: Stage,
-    /// What the vision sensors deliver.
+    /// Images of the vision sensors.
     pub cameras: Cameras,
-    /// What is true in this run.
+    /// The ground truth of this run.
     pub scene: ResolvedScene,
     /// The server's clock at the current call: time since it was started.
     pub now: Duration,
@@ -51,12 +51,12 @@ pub struct Cell {
     pub signals: BTreeMap<String, Value>,
     /// `sim.intparam_idle_fps`, which scripts set; nothing here sleeps between requests.
     pub idle_fps: i64,
-    /// What clients logged last.
+    /// Latest log lines of the clients.
     pub log: VecDeque<String>,
 }
 
 impl Cell {
-    /// The cell of a scene. `seed` and `real_time` override what the scene says.
+    /// The cell of a scene. `seed` and `real_time` override those of the scene.
     ///
     /// # Errors
     /// [`BuildError`], for scenes that are out of range.

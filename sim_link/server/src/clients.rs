@@ -1,4 +1,4 @@
-//! What the server remembers of its clients: one record per id, one per connection.
+//! Records of the clients: one per id, one per connection.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -9,8 +9,8 @@ use super::task::Task;
 /// Clients with different ids that are remembered at a time.
 pub const MAX_CLIENTS: usize = 64;
 
-/// Those of them that one connection may bring: a client has one id, and a new one after a call that it gave up. More
-/// would let a single program take all places.
+/// Most clients per connection: a client has one id, and a new one after a call that it gave up. More would let a
+/// single program take all places.
 pub const MAX_CLIENTS_PER_CONNECTION: usize = 4;
 
 /// Calls of one connection that may be under way: a blocking one, and those that its callbacks make.
@@ -40,7 +40,7 @@ pub enum ClientRefused {
 /// A client, by the id that it sends with every request.
 #[derive(Debug)]
 pub struct Client {
-    /// The connection over which it was last heard of.
+    /// The connection of its last message.
     pub peer: Peer,
     /// Above zero, passes wait until it has asked for one.
     pub stepping_level: u32,
@@ -50,7 +50,7 @@ pub struct Client {
     pub locks: u32,
     /// Idle time after which it is forgotten.
     pub idle_limit: Duration,
-    /// When it was last heard of.
+    /// Time of its last message.
     pub last_seen: Duration,
     /// Since when it has had no connection.
     pub gone_since: Option<Duration>,
@@ -99,8 +99,8 @@ pub struct Running {
     /// What remains to be done.
     pub task: Box<dyn Task>,
     pub waiting: Waiting,
-    /// Since when its client has been waiting for word; `None` while it is the client's turn, to run a callback or to
-    /// say that it goes on waiting.
+    /// Since when its client has been waiting for a message; `None` while it is the client's turn, to run a callback or
+    /// to reply that it goes on waiting.
     pub owed_since: Option<Duration>,
 }
 
@@ -133,7 +133,7 @@ pub struct Clients {
 }
 
 impl Clients {
-    /// Notes that a client was heard of over a connection, and makes a record of it if it is new.
+    /// Records a message of a client over a connection, and makes a record of it if it is new.
     ///
     /// # Errors
     /// [`ClientRefused`], when there are too many that must not be forgotten.
@@ -190,7 +190,7 @@ impl Clients {
         self.connections.iter_mut()
     }
 
-    /// Whether a pass has to wait for somebody.
+    /// Whether a pass has to wait for a client.
     pub fn hold_pass(&self, step: u64) -> bool {
         let waits_for_pass = |uuid: &str| {
             self.connections
@@ -242,9 +242,9 @@ impl Clients {
         self.records.iter().filter(expired).map(|(uuid, _)| uuid.clone()).collect()
     }
 
-    /// When [`Self::expired`] may next have something to say.
+    /// When [`Self::expired`] may next return clients.
     pub fn next_expiry(&self) -> Option<Duration> {
-        // One past the limit: at the limit itself nobody has exceeded it.
+        // One past the limit: the limit itself is not exceeded.
         let past = Duration::from_millis(1);
         let of = |(uuid, client): (&String, &Client)| {
             let silent = (!self.is_working(uuid)).then(|| client.last_seen + client.idle_limit + past);
@@ -254,7 +254,7 @@ impl Clients {
         self.records.iter().filter_map(of).min()
     }
 
-    /// Whether calls of the client go on without it: its silence is then no sign of anything.
+    /// Whether calls of the client go on without it: its silence then means nothing.
     fn is_working(&self, uuid: &str) -> bool {
         let mut calls = self.connections.values().flat_map(|connection| &connection.calls);
         calls.any(|call| call.uuid == uuid && call.owed_since.is_some())

@@ -11,20 +11,20 @@ use super::message::{self, BadRequest, Request};
 use super::task::{Answer, Next, Task, Wake};
 use handeye_cell::world::State;
 
-/// Steps that calls may take in one turn before requests are looked at again. A motion in a stopped simulation has no
-/// pass to wait for and would otherwise keep everybody waiting until it is over.
+/// Steps that calls may take in one turn before requests are handled again. A motion in a stopped simulation has no
+/// pass to wait for and would otherwise keep all clients waiting until it is over.
 const STEPS_PER_TURN: usize = 200;
 
-/// How long a client whose call is under way may hear nothing. The vendor's Python clients of 4.9 and 4.10 give up after
-/// 5 s of silence.
+/// Longest time without a message to a client whose call is under way. The vendor's Python clients of 4.9 and 4.10 give
+/// up after 5 s of silence.
 const SILENCE: Duration = Duration::from_secs(1);
 
 /// How long a pass that need not keep to real time waits for further requests, for each client that has made one since
 /// the last pass: a few calls in a row see the same instant, as they do in the simulator.
 const REQUEST_GRACE: Duration = Duration::from_millis(2);
 
-/// What the simulator puts before the message of an error: the line of its own script that made the call, which is this
-/// one in version 4.10.
+/// Prefix of the simulator's error messages: the line of its own script that made the call, which is this one in
+/// version 4.10.
 const ERROR_LINE: u32 = 354;
 
 /// A reply and the connection that it goes to.
@@ -126,7 +126,7 @@ impl Engine {
         Some(since.saturating_add(REQUEST_GRACE.saturating_mul(clients)))
     }
 
-    /// When the next pass is due, if nobody holds it; `None` for at once.
+    /// When the next pass is due, if no client holds it; `None` for at once.
     fn pass_time(&self) -> Option<Duration> {
         if self.cell.real_time { self.next_pass } else { self.grace_end() }
     }
@@ -180,8 +180,8 @@ impl Engine {
         }
     }
 
-    /// Forgets the clients that are no longer heard of, and returns those that held the simulation: nobody misses the
-    /// others, since a connection that waits for work is silent for long.
+    /// Forgets the clients that have gone silent, and returns those that held the simulation: the others need no
+    /// report, since an idle connection is silent for long.
     fn forget_silent(&mut self, now: Duration) -> Vec<String> {
         let (held, idle): (Vec<_>, Vec<_>) =
             self.clients.expired(now).into_iter().partition(|uuid| self.clients.holds_anything(uuid));

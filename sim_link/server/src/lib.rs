@@ -1,7 +1,7 @@
 //! The cell as a server of CoppeliaSim's ZeroMQ remote API, protocol 2.
 //!
-//! The official Python client drives it unmodified. One thread owns the socket and the world; a call that takes
-//! longer than a moment is answered when it is done, so nobody waits for anybody else.
+//! The official Python client drives it unmodified. One thread owns the socket and the world; a call that takes longer
+//! is answered when it is done, so no client waits for another.
 //!
 //! ```no_run
 //! use handeye_cell::scene::Scene;
@@ -34,7 +34,7 @@ use engine::Engine;
 use handeye_cell::scene::Scene;
 use socket::{Loop, Stopper};
 
-/// What is to be served, and where.
+/// Scene and address of the server.
 #[derive(Debug, Clone)]
 pub struct CellConfig {
     /// The cell.
@@ -45,10 +45,10 @@ pub struct CellConfig {
     pub bind: String,
     /// Port; 0 for any that is free.
     pub port: u16,
-    /// Whether simulated time runs like real time; as the scene says if absent.
+    /// Whether simulated time runs like real time; as in the scene if absent.
     pub real_time: Option<bool>,
-    /// A connection that answers nothing for so long is gone although nobody closed it: a pulled plug, a computer that
-    /// sleeps. Two seconds later its client is forgotten, with its stepping and its motions.
+    /// A connection without an answer for this long is gone although neither side closed it: a pulled plug, a computer
+    /// that sleeps. Two seconds later its client is forgotten, with its stepping and its motions.
     pub silence: Duration,
     /// Only what CoppeliaSim has: no `handeye.*`, so clients read image and pose, stop the arm and end as they do there.
     pub coppeliasim_only: bool,
@@ -82,27 +82,27 @@ pub enum CellError {
         "port {port} on {bind} is in use: end the program that listens there, or choose another port (0 finds a free one)"
     )]
     PortInUse {
-        /// Address asked for.
+        /// Requested address.
         bind: String,
-        /// Port asked for.
+        /// Requested port.
         port: u16,
     },
-    /// The address is none of this machine's, or the port is not allowed.
+    /// The address does not belong to this machine, or the port is not allowed.
     #[error("cannot listen on {bind}:{port}: {reason}; 127.0.0.1 always works")]
     Bind {
-        /// Address asked for.
+        /// Requested address.
         bind: String,
-        /// Port asked for.
+        /// Requested port.
         port: u16,
-        /// What the system said.
+        /// The error of the operating system.
         reason: String,
     },
     /// The system refuses a socket or a thread.
     #[error("the cell's server could not be started: {operation}: {reason}")]
     System {
-        /// What was tried.
+        /// The operation that failed.
         operation: &'static str,
-        /// What the system said.
+        /// The error of the operating system.
         reason: String,
     },
 }
@@ -139,7 +139,8 @@ impl CellServer {
         format!("tcp://{}", self.address)
     }
 
-    /// Whether only programs of this machine can connect. There is no password: who can connect can move the arm.
+    /// Whether only programs of this machine can connect. There is no password: any program that can connect can move
+    /// the arm.
     pub fn is_local(&self) -> bool {
         self.address.ip().to_canonical().is_loopback()
     }

@@ -15,14 +15,14 @@ const MAX_ARGS: usize = 64;
 /// Longest client id that is kept; a UUID has 36 characters.
 const MAX_UUID_BYTES: usize = 128;
 
-/// Idle time after which a client is forgotten unless it says otherwise, and the longest that it may ask for.
+/// Default and longest idle time after which a client is forgotten.
 const DEFAULT_IDLE_LIMIT: Duration = Duration::from_mins(10);
 const MAX_IDLE_LIMIT: Duration = Duration::from_hours(24);
 
-/// The name of a request that says that a callback has returned, or that the client goes on waiting.
+/// The name of a request that reports that a callback has returned, or that the client goes on waiting.
 pub const EXECUTED: &str = "_*executed*_";
 
-/// What a client wants.
+/// A request of a client.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Request {
     /// A function is to be called.
@@ -33,7 +33,7 @@ pub enum Request {
         func: String,
         /// Arguments; trailing nulls are as the client counted them.
         args: Vec<Value>,
-        /// Idle time after which the client may be forgotten, where it says so.
+        /// Idle time after which the client may be forgotten, where it gives one.
         idle_limit: Duration,
     },
     /// A callback has returned.
@@ -65,7 +65,7 @@ pub enum BadRequest {
         /// Its length.
         bytes: usize,
     },
-    /// Decodes, but is no request.
+    /// Decodes, but is not a request.
     #[error("request is not understood: {reason}")]
     Shape {
         /// Why.
@@ -80,7 +80,7 @@ fn shape(reason: &'static str) -> BadRequest {
 /// Reads a request.
 ///
 /// # Errors
-/// [`BadRequest`], for anything that is no request.
+/// [`BadRequest`], for anything that is not a request.
 pub fn parse(bytes: &[u8]) -> Result<Request, BadRequest> {
     if bytes.len() > MAX_REQUEST_BYTES {
         return Err(BadRequest::TooLong { bytes: bytes.len() });
@@ -141,7 +141,7 @@ fn idle_limit(message: &Value) -> Duration {
     .min(MAX_IDLE_LIMIT)
 }
 
-/// The reply of a function that returned `values`. Nothing is an empty map, as the simulator has it.
+/// The reply of a function that returned `values`. Nothing is an empty map, as in the simulator.
 pub fn returned(values: Vec<Value>) -> Vec<u8> {
     wire::encode(&wire::map([("ret", list(values))]))
 }
@@ -157,12 +157,12 @@ pub fn callback(name: &str, args: Vec<Value>) -> Vec<u8> {
     wire::encode(&wire::map([("func", Value::from(name)), ("args", list(args))]))
 }
 
-/// Asks the client to go on waiting for its call, and to say so.
+/// Asks the client to go on waiting for its call, and to confirm that.
 pub fn wait() -> Vec<u8> {
     callback("_*wait*_", Vec::new())
 }
 
-/// What clients of protocol 1 are told.
+/// The reply to clients of protocol 1.
 pub fn version_mismatch() -> Vec<u8> {
     let text = "The client ZeroMQ remote API version does not match CoppeliaSim's version";
     wire::encode(&wire::map([("error", Value::from(text)), ("success", Value::from(false))]))

@@ -31,7 +31,7 @@ pub trait Plan: std::fmt::Debug + Send {
     /// Moves joints or objects to the state.
     ///
     /// # Errors
-    /// What it is to move no longer exists.
+    /// The moved object no longer exists.
     fn apply(&mut self, cell: &mut Cell) -> Result<(), ApiError>;
 
     /// Whether the state is the last one.
@@ -63,12 +63,12 @@ pub struct Motion {
     pub callback: Option<String>,
     /// Length of a step; the simulation's if absent.
     pub time_step_s: Option<f64>,
-    /// Somebody asked for the motion to end early.
+    /// The motion was requested to end early.
     pub braking: bool,
 }
 
 impl Motion {
-    /// A motion that nobody has stopped.
+    /// A motion that is not stopped.
     pub fn new(plan: Box<dyn Plan>, callback: Option<String>, time_step_s: Option<f64>) -> Self {
         Self { plan, callback, time_step_s, braking: false }
     }
@@ -167,7 +167,7 @@ impl Plans {
     /// The motion that a state map belongs to.
     ///
     /// # Errors
-    /// There is none, or none now.
+    /// There is no such motion, or no longer.
     pub fn of(&mut self, state: &Fields<'_>) -> Result<(i64, &mut Motion), ApiError> {
         let id = Self::id(state)?;
         let motion = self.plans.get_mut(&id).ok_or(ApiError::Field { problem: "invalid", name: "ruckigObj" })?;
@@ -177,7 +177,7 @@ impl Plans {
     /// Forgets the motion that a state map belongs to.
     ///
     /// # Errors
-    /// The map is no state map.
+    /// The map is not a state map.
     pub fn drop_of(&mut self, state: &Fields<'_>) -> Result<(), ApiError> {
         self.plans.remove(&Self::id(state)?);
         Ok(())
@@ -193,7 +193,7 @@ impl Plans {
     }
 }
 
-/// The synchronisation that a `flags` value asks for; absent and −1 mean the default.
+/// The synchronisation of a `flags` value; absent and −1 mean the default.
 pub fn sync_of(flags: Option<i64>) -> Sync {
     match flags.unwrap_or(-1) {
         flags if flags < 0 => Sync::Phase,
@@ -219,7 +219,7 @@ pub fn time_step_of(given: Option<f64>) -> Result<Option<f64>, ApiError> {
 }
 
 /// Time step and flags as a state map shows them: with limits the time step of the simulation is 0, and without any the
-/// motion is over in a step of 10 s whatever was asked for; minimum velocities and accelerations are always in use.
+/// motion is over in a step of 10 s whatever was requested; minimum velocities and accelerations are always in use.
 pub fn stated(time_step_s: Option<f64>, flags: Option<i64>, has_limits: bool) -> (f64, i64) {
     const NO_SYNC: i64 = 3;
     const MINIMA: i64 = 0x300;

@@ -152,7 +152,7 @@ fn garbage_is_answered_with_an_error_and_does_not_end_the_service() {
         client.socket.send(bytes, 0).expect("sends");
         assert!(client.receive().get("err").is_some());
     }
-    // Without the empty frame there is no place for a reply.
+    // Without the empty frame a reply has no address.
     let context = zmq::Context::new();
     let dealer = context.socket(zmq::DEALER).expect("socket");
     dealer.set_linger(0).expect("option");

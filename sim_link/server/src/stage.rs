@@ -1,4 +1,4 @@
-//! The objects of the built-in cell: arm, tip, camera, board and what stands around, as a scene describes them.
+//! The objects of the built-in cell: arm, tip, camera, board and obstacles, as a scene describes them.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
@@ -30,7 +30,7 @@ pub struct Stage {
     pub plane: Handle,
     /// `plane_from_target`: where the first corner is on the sheet.
     pub plane_from_target: Isometry3<f64>,
-    /// What there is to see besides the board: each solid in the frame of its object.
+    /// Visible objects other than the board: each solid in the frame of its object.
     pub solids: Vec<(Handle, Solid)>,
 }
 
@@ -150,7 +150,7 @@ fn finish(alias: &str) -> Finish {
     }
 }
 
-/// `mounting plate` → `MountingPlate`: a name that can stand in a path.
+/// `mounting plate` → `MountingPlate`: a name that is valid in a path.
 fn alias(name: &str) -> String {
     name.split(|c: char| !c.is_alphanumeric())
         .flat_map(|word| {
@@ -181,7 +181,7 @@ impl CellFaults {
         Self { joints, tip, plane, scene, slip, reported: None, moving: false, settled: 0 }
     }
 
-    /// Moves the board as if somebody had put it there: what is forgotten at the end of the simulation goes back.
+    /// Moves the board as a client would; like any such change it is undone at the end of the simulation.
     fn let_slip(&mut self, tree: &mut Tree) {
         let Some(slip) = self.slip.filter(|slip| self.settled >= slip.at_stop) else { return };
         self.slip = None;
@@ -204,7 +204,7 @@ impl Faults for CellFaults {
         }
         self.moving = moved;
         self.reported = Some(reported);
-        // There are none for values that are not numbers, and then there is no place either.
+        // There are none for values that are not numbers, and then there is no pose either.
         let displacements = self.scene.joint_displacements(&reported).unwrap_or_default();
         for (joint, displacement) in self.joints.iter().zip(displacements) {
             if let Ok(object) = tree.get_mut(*joint) {

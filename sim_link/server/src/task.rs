@@ -15,7 +15,7 @@ pub enum Answer {
     Values(Vec<Value>),
     /// A reply that is already bytes.
     Encoded(Vec<u8>),
-    /// The list of what a namespace offers, or an error if there is none of that name.
+    /// The list of functions of a namespace, or an error if there is no such namespace.
     Info(String),
     /// Nothing, or an error if there is no namespace of this name.
     Require(String),
@@ -64,7 +64,7 @@ pub trait Task: std::fmt::Debug + Send {
     /// Comes to rest within its limits as soon as they allow, and then returns. Tasks that move nothing go on.
     fn brake(&mut self, _cell: &Cell) {}
 
-    /// Whether it moves something that must not stop dead when its client vanishes.
+    /// Whether it moves an object that must brake when its client disconnects.
     fn is_moving(&self) -> bool {
         false
     }
@@ -101,15 +101,15 @@ impl Task for StopTask {
 pub struct WaitTask {
     /// Seconds to wait.
     pub seconds: f64,
-    /// Whether they are simulated ones.
+    /// Whether `since_s` is simulated time.
     pub simulated: bool,
-    /// Where the clock stood at the call.
+    /// Time at the call.
     pub since_s: f64,
 }
 
 impl WaitTask {
-    /// How often a wait for simulated time looks whether the simulation advances again. Nobody can tell the
-    /// difference from less, and the server sleeps in between.
+    /// Interval at which a wait for simulated time checks whether the simulation advances again. A shorter one would
+    /// make no visible difference, and the server sleeps in between.
     const LOOK_AGAIN: Duration = Duration::from_millis(20);
 }
 
@@ -134,7 +134,7 @@ impl Task for WaitTask {
     }
 }
 
-/// `sim.testCB`: calls a function of the client again and again and returns what it returned last.
+/// `sim.testCB`: calls a function of the client repeatedly and returns its last result.
 #[derive(Debug)]
 pub struct CallbackTask {
     pub name: String,

@@ -1,4 +1,4 @@
-//! The one place that knows how the axes of a CoppeliaSim vision sensor lie in a camera, and those of its board on the sheet.
+//! The only definition of the axes of a CoppeliaSim vision sensor in a camera, and of those of its board on the sheet.
 
 use handeye_geometry::frames::{Camera, Pose, Sensor};
 use handeye_geometry::targets::TargetSpec;
@@ -11,7 +11,7 @@ pub fn sensor_from_camera() -> Pose<Sensor, Camera> {
     Pose::from_isometry(Isometry3::from_parts(Translation3::identity(), half_turn))
 }
 
-/// The target on the sheet that it is printed on, as the public scene has it: the middles of both are one. The sheet's z
+/// The target on the sheet that it is printed on, as in the public scene: the middles of both coincide. The sheet's z
 /// points at the viewer and its y up; the target's z points into the sheet and its y down the rows.
 pub fn sheet_from_target(target: &TargetSpec) -> Isometry3<f64> {
     let half_turn_about_x = UnitQuaternion::new_unchecked(Quaternion::new(0.0, 1.0, 0.0, 0.0));

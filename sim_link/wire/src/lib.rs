@@ -44,23 +44,23 @@ pub enum WireError {
     /// Not CBOR, cut short, or nested too deeply.
     #[error("message is not valid CBOR: {reason}")]
     Malformed {
-        /// What the decoder said.
+        /// The error of the decoder.
         reason: String,
     },
     /// A second item, or garbage, follows the first.
     #[error("{bytes} stray bytes follow the message")]
     TrailingBytes {
-        /// How many.
+        /// Number of bytes.
         bytes: usize,
     },
-    /// A value is not what the caller asked for.
+    /// A value is not of the requested type.
     #[error("{what}: expected {expected}, got {got}")]
     WrongType {
-        /// Where in the message.
+        /// Place in the message.
         what: String,
-        /// Type asked for.
+        /// Requested type.
         expected: &'static str,
-        /// What was there.
+        /// What was found.
         got: &'static str,
     },
 }

@@ -1,4 +1,5 @@
-//! A cell: where camera, target and tool are on and about an arm, the views that are taken in it, and the points that are touched.
+//! A cell: where camera, target and tool are on and around an arm, the views that are taken in it, and the points that are
+//! touched.
 
 use handeye_arm::Arm;
 use handeye_estimate::handeye::Mode;
@@ -20,14 +21,14 @@ use crate::real::Real;
 pub const TARGET: TargetSpec = TargetSpec::Chessboard(Grid { columns: 9, rows: 6, square_m: 0.025 });
 const CORNER_PX: f64 = 0.1;
 const TOOL_M: f64 = 0.12;
-/// Draws at the most until as many views or touches are within reach.
+/// Draws at most until as many views or touches are within reach.
 pub const TRIES: usize = 2000;
-/// Turns about one point by which a tool is found.
+/// Rotations about one point from which a tool is found.
 const TURNS: usize = 12;
 const CONE: Cone =
     Cone { tilt_deg: 40.0, roll_deg: 150.0, distance_m: 0.3..0.5, beside_m: 0.04, distance_first: false };
 
-/// What is wrong besides the arm.
+/// What is wrong in addition to the arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Wrong {
     #[default]
@@ -38,7 +39,7 @@ pub enum Wrong {
     Square,
     /// The principal point of the lens given is half a pixel off.
     Lens,
-    /// The arm goes on to the nearest view that is left at 50 mm/s or 10°/s, whichever is slower, and its joints are read 80 ms after
+    /// The arm moves on to the nearest remaining view at 50 mm/s or 10°/s, whichever is slower, and its joints are read 80 ms after
     /// the image.
     Late,
 }
@@ -56,7 +57,7 @@ impl Wrong {
         }
     }
 
-    /// The lens that is given.
+    /// The given lens.
     fn lens(self, rng: &mut ChaCha8Rng) -> Intrinsics {
         let mut lens = camera();
         if self == Self::Lens {
@@ -68,12 +69,12 @@ impl Wrong {
     }
 }
 
-/// What the tip goes on by until its joints are read, metres.
+/// How far the tip moves until its joints are read, metres.
 const LATE_M: f64 = 0.05 * 0.08;
 /// And radians.
 const LATE_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0 * 0.08;
 
-/// An arm, what its controller believes, and where things are on and about it.
+/// An arm, what its controller believes, and where things are on and around it.
 pub struct Cell {
     pub real: Real,
     pub believed: Chain,
@@ -87,18 +88,18 @@ pub struct Cell {
     target: Isometry3<f64>,
     pub tool: Isometry3<f64>,
     wrong: Wrong,
-    /// The points of the board as they are.
+    /// The true points of the board.
     board: Vec<Point3<f64>>,
-    /// The lens that is given.
+    /// The given lens.
     pub lens: Intrinsics,
 }
 
 pub struct Taken {
     pub joints: Vec<f64>,
-    /// As the calibration is given them.
+    /// As given to the calibration.
     pub reported: Vec<f64>,
     pub corners: Vec<Corner>,
-    /// Where the camera saw the target from, as it was.
+    /// The true pose of the tip from which the camera saw the target.
     tip: Isometry3<f64>,
 }
 
@@ -107,7 +108,7 @@ impl Cell {
         let Model { believed, start, arm, .. } = model;
         let turned_over = UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI);
         let centred = Translation3::from(-TARGET.centre().coords);
-        // Before the camera: a target's z axis points away from who looks at it.
+        // Before the camera: a target's z axis points away from the viewer.
         let before = Isometry3::translation(0.0, 0.0, 0.4) * centred;
         let tip = believed.forward(&start);
         let universal = name.starts_with("ur");
@@ -146,7 +147,7 @@ impl Cell {
         self.arm.joints().iter().zip(&joints).all(|(joint, value)| joint.range.contains(*value)).then_some(joints)
     }
 
-    /// Where the tip is when it is sent to joint values: it does not come back to the same place.
+    /// Where the tip is when it is sent to joint values: it does not return to exactly the same place.
     pub fn sent(&self, joints: &[f64], rng: &mut ChaCha8Rng) -> Isometry3<f64> {
         let [metres, radians] = self.repeats;
         self.real.tip(joints) * shift_and_turn(&noise_twist(rng, metres, radians))
@@ -159,7 +160,7 @@ impl Cell {
         }
     }
 
-    /// Where a camera is that is mounted so, with the tip there.
+    /// Where a camera with this mounting is, with the tip there.
     pub fn camera_at(&self, tip: &Isometry3<f64>, mounted: &Isometry3<f64>) -> Isometry3<f64> {
         match self.mode {
             Mode::EyeInHand => tip * mounted,
@@ -174,7 +175,7 @@ impl Cell {
         }
     }
 
-    /// So many views; fewer where the arm does not reach them.
+    /// This many views; fewer if the arm does not reach them.
     pub fn take(&self, views: usize, rng: &mut ChaCha8Rng) -> Vec<Taken> {
         let mut taken = Vec::new();
         for _ in 0..TRIES {
@@ -188,7 +189,7 @@ impl Cell {
         taken
     }
 
-    /// Joints as they are read when the arm has gone on towards the next view.
+    /// Joints as read when the arm has moved on towards the next view.
     fn read_late(&self, taken: &mut [Taken]) {
         let apart =
             |a: &Taken, b: &Taken| -> f64 { a.joints.iter().zip(&b.joints).map(|(a, b)| (a - b).powi(2)).sum() };
@@ -214,7 +215,7 @@ impl Cell {
         self.view_at(self.believed_joints(&wanted, &near)?, rng)
     }
 
-    /// What is seen with the joints there; nothing where the board is not wholly in the image.
+    /// What is seen with the joints there; nothing if the board is not completely in the image.
     pub fn view_at(&self, joints: Vec<f64>, rng: &mut ChaCha8Rng) -> Option<Taken> {
         let tip = self.sent(&joints, rng);
         let pose = self.camera_from_target(&tip);
@@ -227,7 +228,7 @@ impl Cell {
         Some(Taken { reported: joints.clone(), joints, corners: corners.collect::<Option<_>>()?, tip })
     }
 
-    /// Where an arm before its work stands, a little off: some start finds every pose.
+    /// Near where an arm is before its work: some start finds every pose.
     fn near_start(&self, rng: &mut ChaCha8Rng) -> Vec<f64> {
         let mut joints: Vec<f64> = self.start.iter().map(|angle| angle + 0.3 * normal(rng)).collect();
         if let Some(last) = joints.last_mut() {
@@ -236,8 +237,8 @@ impl Cell {
         joints
     }
 
-    /// The tip of the tool in the frame of the tip, by an arm that turned about one point: `believed` says where it takes its tip to be.
-    /// The poses are turns from that of a view, and reached from there, as a person does.
+    /// The tip of the tool in the frame of the tip, from an arm that rotated about one point: `believed` returns where it takes its
+    /// tip to be. The poses are rotated from that of a view, and reached from there, as an operator does.
     pub fn tool_by(
         &self,
         believed: impl Fn(&[f64]) -> Isometry3<f64>,
@@ -256,9 +257,9 @@ impl Cell {
             let turn = UnitQuaternion::from_scaled_axis(Vector3::from_fn(|_, _| rng.random_range(-0.5..0.5)));
             let goal = Isometry3::from_parts(point.translation, middle.rotation * turn) * self.tool.inverse();
             let Some(joints) = self.believed_joints(&goal, near) else { continue };
-            // The person sees the point and corrects: the tip of the tool is there, whatever the controller believes.
+            // The operator sees the point and corrects: the tip of the tool is there, whatever the controller believes.
             let wanted = point.translation.vector;
-            // The joints are reported as they are not quite.
+            // The reported joints are not exact.
             let [metres, radians] = self.repeats;
             let unreported = shift_and_turn(&noise_twist(rng, metres, radians));
             let jogged = newton(
@@ -293,8 +294,8 @@ impl Cell {
         (in_camera, self.camera_at(&view.tip, &self.camera) * in_camera)
     }
 
-    /// How the tool is turned when it touches: against the board's normal, or along the mean axis that the tip had in the views; tilted by
-    /// up to 15°, with any turn about itself.
+    /// How the tool is oriented when it touches: against the board's normal, or along the mean axis that the tip had in the views;
+    /// tilted by up to 15°, with any rotation about itself.
     pub fn down(&self, taken: &[Taken], rng: &mut ChaCha8Rng) -> UnitQuaternion<f64> {
         let axis = match self.mode {
             Mode::EyeInHand => self.target.rotation * Vector3::z(),

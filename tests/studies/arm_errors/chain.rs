@@ -1,4 +1,4 @@
-//! Chains of revolute joints as their makers publish them, and joint values for a pose by Newton's method.
+//! Chains of revolute joints as published by their makers, and joint values for a pose by Newton's method.
 
 use std::collections::BTreeMap;
 
@@ -7,21 +7,21 @@ use nalgebra::{DMatrix, DVector, Isometry3, Matrix6xX, Translation3, UnitQuatern
 
 use crate::Failure;
 
-/// One link as a URDF has it: `Trans(xyz) Rz(yaw) Ry(pitch) Rx(roll)`, then the joint about z.
+/// One link as in a URDF: `Trans(xyz) Rz(yaw) Ry(pitch) Rx(roll)`, then the joint about z.
 #[derive(Clone, Copy)]
 pub struct Link {
     pub place: Vector3<f64>,
     pub turn: Vector3<f64>,
 }
 
-/// A chain from the base to the tip, which lies behind the last joint by a length along its axis.
+/// A chain from the base to the tip, which is at some length after the last joint along its axis.
 #[derive(Clone)]
 pub struct Chain {
     pub links: Vec<Link>,
     pub flange_m: f64,
 }
 
-/// What an arm is called, how it stands before its work, and what lies in it, kilograms behind each joint.
+/// The name of an arm, its pose before its work, and its masses, kilograms after each joint.
 pub struct Model {
     pub believed: Chain,
     pub start: Vec<f64>,
@@ -34,7 +34,7 @@ impl Chain {
         self.frames(joints).last().copied().unwrap_or_else(Isometry3::identity) * self.flange()
     }
 
-    /// The frame behind each joint, in the base.
+    /// The frame after each joint, in the base.
     pub fn frames(&self, joints: &[f64]) -> Vec<Isometry3<f64>> {
         let behind = self.links.iter().zip(joints).scan(Isometry3::identity(), |pose, (link, angle)| {
             let [roll, pitch, yaw] = [link.turn.x, link.turn.y, link.turn.z];
@@ -104,7 +104,7 @@ impl Chain {
     }
 }
 
-/// An arm that the program knows as well, by its own numbers.
+/// An arm that the program knows as well, from its own numbers.
 pub fn model(name: &str) -> Result<Model, Failure> {
     let believed = Chain::nominal(name).ok_or_else(|| format!("no chain of {name}"))?;
     let (start, masses_kg): (Vec<f64>, Vec<f64>) = match name {
@@ -120,7 +120,7 @@ pub fn model(name: &str) -> Result<Model, Failure> {
     Ok(Model { believed, start, masses_kg, arm })
 }
 
-/// Newton's method on joints from `near`; `None` where it does not arrive.
+/// Newton's method on joints from `near`; `None` if it does not converge.
 pub fn newton(
     forward: impl Fn(&[f64]) -> Isometry3<f64>,
     near: &[f64],
@@ -141,7 +141,7 @@ pub fn newton(
             })
             .collect();
         let by_joints = Matrix6xX::from_columns(&columns);
-        // The shortest step where there are joints to spare.
+        // The shortest step if there are redundant joints.
         let damped = &by_joints * by_joints.transpose() + DMatrix::identity(6, 6) * 1e-8;
         let step: DVector<f64> = by_joints.transpose() * damped.lu().solve(&here)?;
         let shorter = 0.4 / step.amax().max(0.4);

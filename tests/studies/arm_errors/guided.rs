@@ -1,4 +1,4 @@
-//! Views that guided capture chooses, from one at random on.
+//! Views that guided capture chooses, starting from a random one.
 
 use handeye_arm::JointValues;
 use handeye_estimate::diagnose::calibrate_with;
@@ -14,10 +14,10 @@ use rand_chacha::ChaCha8Rng;
 use crate::cell::{Cell, Taken};
 use crate::session::{Placed, observed};
 
-/// No more poses than that, with or without a view.
+/// Limit of poses, with or without a view.
 const MOST_POSES: usize = 60;
 
-/// So many views, or as many as the guide finds.
+/// This many views, or as many as the guide finds.
 pub fn guided(cell: &Cell, placed: &Placed, most_views: usize, free_lens: bool, rng: &mut ChaCha8Rng) -> Vec<Taken> {
     let mut taken = cell.take(1, rng);
     let Some(first) = taken.first() else { return taken };
@@ -33,7 +33,7 @@ pub fn guided(cell: &Cell, placed: &Placed, most_views: usize, free_lens: bool, 
     let pace = Pace { speed: 1.0, acceleration: 2.0, jerk: f64::INFINITY };
     let around = Surroundings::default();
     let mut robot = Robot { arm, around, clearance_m: 0.0, joints: values(&first.joints), pace, sight: None };
-    // A goal that is not reached: the views are what is asked for.
+    // An unreachable goal: the number of views is the limit.
     let options = GuidedOptions { goal_m: 1e-6, least_gain: 0.0, most_views, ..GuidedOptions::default() };
     let mut guide = Guide::new(options);
     let mut calibration = None;

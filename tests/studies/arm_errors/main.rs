@@ -2,19 +2,19 @@
 //!
 //!     cargo run --release -p handeye_studies --example arm_errors -- CSV|ARM [VIEWS] [lens] [guided] [unknown|poses] [exact] [joints] [bent|square|lens-off|late] [accuracy=PX] [sessions=40] [KIND…]
 //!
-//! With a CSV of factory calibrations (its columns: `arm, model, link, x_m, y_m, z_m, roll_rad, pitch_rad, yaw_rad`) an arm moves by
-//! it, and its controller believes the numbers of the data sheet: one session an arm and a set-up. With `joints` the joints give way
-//! under 2 kg and have gears as well; with `exact` the arms are as their data sheets have them. With the name of an arm (`ur5e`,
-//! `panda`, `xarm6`) errors of each kind are drawn, one arm a session; with `bent`, `square`, `lens-off` or `late` something else is wrong
-//! as well. With `poses` no joints are known but how accurate the robot is: what it is off over 300 views, base and tip where that is
-//! least. `accuracy` is what is said of the lens that is given, which is else taken as exact.
+//! With a CSV of factory calibrations (its columns: `arm, model, link, x_m, y_m, z_m, roll_rad, pitch_rad, yaw_rad`) an arm moves
+//! according to it, and its controller believes the numbers of the data sheet: one session per arm and set-up. With `joints` the
+//! joints yield under 2 kg and have gears as well; with `exact` the arms are as in their data sheets. With the name of an arm
+//! (`ur5e`, `panda`, `xarm6`) errors of each kind are drawn, one arm per session; with `bent`, `square`, `lens-off` or `late`
+//! something else is wrong as well. With `poses` no joints are known, only the accuracy of the robot: its error over 300 views,
+//! with base and tip where that is least. `accuracy` is the stated accuracy of the given lens, which is otherwise taken as exact.
 //!
-//! Corners have 0.1 px of noise, the arm repeats to 0.02 mm and 0.005°. A tool of 120 mm, whose tip was found by the same arm about one
-//! point, is sent to points that the camera saw; the distance between the two is printed, RMS over 40 points a session. Beside it
-//! stands what a point in space is off by the hand-eye transform alone, and what is stated of that; what no view can tell from the
-//! transform (the arm's first joint, the zero of its last) is no error of it.
-//! Nothing of the truth of a touch comes from the estimator: chains, joints, lens and noise are written out here or in
-//! `handeye_simulate`. What belongs to the gauge in space follows the convention of the estimator, by its own errors of an arm.
+//! Corners have 0.1 px of noise, the arm repeats to 0.02 mm and 0.005°. A tool of 120 mm, whose tip was found by the same arm about
+//! one point, is sent to points that the camera saw; the distance between the two is printed, RMS over 40 points per session. Next
+//! to it are the error of a point in space from the hand-eye transform alone, and its stated error; what no view can distinguish
+//! from the transform (the arm's first joint, the zero of its last) is not an error of it. No part of the truth of a touch comes
+//! from the estimator: chains, joints, lens and noise are written out here or in `handeye_simulate`. What belongs to the gauge in
+//! space follows the convention of the estimator, with its own errors of an arm.
 
 mod cell;
 mod chain;
@@ -90,7 +90,7 @@ fn drawn((name, wrong): (&str, Wrong), kind: Kind, mode: Mode, seed: u64) -> Res
     Ok(Cell::new(name, model, real, kind.repeats(), mode).with(wrong, rng))
 }
 
-/// Arms of which the program is not told what they are.
+/// Arms that the program does not know.
 fn of_unknown(what @ (name, wrong): (&str, Wrong), asked: Asked, count: u64, kinds: &[Kind]) {
     for (set_up, mode) in SET_UPS {
         println!(
@@ -119,7 +119,7 @@ fn of_unknown(what @ (name, wrong): (&str, Wrong), asked: Asked, count: u64, kin
     }
 }
 
-/// Robots of which the program is told how accurate they are, and no more.
+/// Robots of which the program only knows the accuracy.
 fn of_poses(what @ (name, _): (&str, Wrong), asked: Asked, count: u64, kinds: &[Kind]) {
     for (set_up, mode) in SET_UPS {
         for kind in kinds {
@@ -225,8 +225,8 @@ fn of_drawn(what @ (name, wrong): (&str, Wrong), asked: Asked, count: u64, kinds
 
 const HEADER: &str = "| kind | sessions | Park mm | as it is mm | corrected mm | worse | stated 95 % mm | touches within | sessions within, corrected | in space mm | stated | within |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |";
 
-/// Medians over sessions; RMS in brackets. Those that corrected commands made worse, and that whose corrected touches were within what
-/// is stated 95 times of a hundred.
+/// Medians over sessions; RMS in brackets. Those that corrected commands made worse, and those whose corrected touches were within
+/// the stated error 95 times of a hundred.
 fn row(name: &str, sessions: &[Touched]) {
     let count = sessions.len().max(1) as f64;
     let middle = |of: &dyn Fn(&Touched) -> f64| median(sessions.iter().map(of)).unwrap_or(f64::NAN);

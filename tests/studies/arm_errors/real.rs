@@ -1,4 +1,4 @@
-//! How an arm really moves: what is wrong with it, drawn without any model of the estimator.
+//! How an arm really moves: its errors, drawn without any model of the estimator.
 
 use handeye_simulate::links::normal;
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::chain::{Chain, Model};
 
-/// Stiffness of the joints up to the third and of those of the wrist, N·m a radian, in the middle: half to twice of it.
+/// Stiffness of the joints up to the third and of those of the wrist, N·m per radian, the median: half to twice of it.
 const STIFF: [f64; 2] = [5e4, 1.5e4];
 const GRAVITY: f64 = 9.81;
 
@@ -16,22 +16,24 @@ const GRAVITY: f64 = 9.81;
 pub enum Kind {
     /// Nothing.
     Exact,
-    /// Zeros of 0.05°, places of 0.2 mm, tilts of 0.03°, half as much and twice.
+    /// Half of [`Self::Links`].
     HalfLinks,
+    /// Zeros of 0.05°, places of 0.2 mm, tilts of 0.03°.
     Links,
+    /// Twice of [`Self::Links`].
     TwiceLinks,
-    /// Those, and zeros of 1°: a cheap arm.
+    /// [`Self::Links`] with zeros of 1°: a cheap arm.
     Zeros,
     /// One link 2 mm longer.
     LongLink,
-    /// Joints give way by what they carry, without and with 2 kg at the tip.
+    /// Joints yield under their load, without and with 2 kg at the tip.
     Elastic,
     Loaded,
-    /// Gears that are not centred by 0.01 to 0.03°.
+    /// Gears that are eccentric by 0.01 to 0.03°.
     Gears,
     /// Links, joints with 2 kg and gears.
     All,
-    /// The tip is off by what grows with its place, in the axes of the base: 2 mm and 0.1° a metre.
+    /// The tip has an error that grows with its place, in the axes of the base: 2 mm and 0.1° per metre.
     Affine,
     /// It repeats to 0.1 mm and 0.02°.
     White,
@@ -70,7 +72,7 @@ impl Kind {
         }
     }
 
-    /// Whether the chain of its links is all that is wrong.
+    /// Whether the chain of its links is the only error.
     pub fn is_of_links(self) -> bool {
         matches!(
             self,
@@ -78,7 +80,7 @@ impl Kind {
         )
     }
 
-    /// Metres and radians to which it repeats.
+    /// Repeatability in metres and radians.
     pub fn repeats(self) -> [f64; 2] {
         match self {
             Self::White => [1e-4, 0.02_f64.to_radians()],
@@ -87,16 +89,16 @@ impl Kind {
     }
 }
 
-/// An arm as it is.
+/// The true arm.
 pub struct Real {
     pub chain: Chain,
-    /// Amplitude \[rad\], turns a turn and phase of what a gear adds, of every joint.
+    /// Amplitude \[rad\], turns per turn and phase of the error of a gear, for every joint.
     gears: Vec<[f64; 3]>,
-    /// What lies behind each joint and at the tip, kilograms; nothing where no joint gives way.
+    /// Masses after each joint and at the tip, kilograms; empty if no joint yields.
     masses_kg: Vec<f64>,
-    /// N·m a radian.
+    /// N·m per radian.
     stiffness: Vec<f64>,
-    /// Metres and radians a metre, and about what place.
+    /// Metres and radians per metre, and about which place.
     affine: Option<(Matrix3<f64>, Matrix3<f64>, Vector3<f64>)>,
 }
 
@@ -106,7 +108,7 @@ impl Real {
         Self { chain, gears: Vec::new(), masses_kg: Vec::new(), stiffness: Vec::new(), affine: None }
     }
 
-    /// The same with joints that give way under 2 kg, and gears.
+    /// The same with joints that yield under 2 kg, and gears.
     pub fn with_joints(self, model: &Model, rng: &mut ChaCha8Rng) -> Self {
         Self { gears: gears(self.chain.links.len(), rng), ..self.elastic(model, 2.0, rng) }
     }
@@ -140,7 +142,7 @@ impl Real {
             Kind::Zeros => links(1.0, 1.0, rng),
             Kind::LongLink => {
                 let mut chain = nominal.clone();
-                // The forearm, or what stands for it, along where it goes.
+                // The forearm, or its counterpart, along its direction.
                 let forearm = chain.links.len() / 2;
                 let place = chain.links[forearm].place;
                 chain.links[forearm].place += place.normalize() * 2e-3;
@@ -176,7 +178,7 @@ impl Real {
         Isometry3::from_parts(Translation3::from(tip.translation.vector + shift * place), turn * tip.rotation)
     }
 
-    /// What each joint gives way by, radians, under masses that lie in the middle of each link and at the tip.
+    /// The deflection of each joint, radians, under masses in the middle of each link and at the tip.
     fn given_way(&self, joints: &[f64]) -> Vec<f64> {
         let frames = self.chain.frames(joints);
         let mut places: Vec<Vector3<f64>> = frames.iter().map(|frame| frame.translation.vector).collect();

@@ -22,30 +22,30 @@ use crate::chain::between;
 
 const TOUCHES: usize = 40;
 
-/// Distances of touches by an arm as it is, by one whose command is corrected, and by the best of what Park and Martin find from the
-/// same views, RMS, millimetres; and which part of the first two is within the 95 % that are stated of them.
+/// Distances of touches with uncorrected commands, with corrected ones, and with the best transform that Park and Martin's method
+/// finds from the same views, RMS, millimetres; and which part of the first two is within their stated 95 %.
 pub struct Touched {
     pub as_it_is_mm: f64,
     pub corrected_mm: f64,
     pub park_mm: f64,
     pub within: [f64; 2],
     pub stated_mm: [f64; 2],
-    /// Error of a point where the board was seen by the transform alone, and what is stated of it; not a number where the errors of
-    /// the arm are not those of a chain, and no one transform is the true one.
+    /// Error of a point where the board was seen from the transform alone, and the stated error; NaN if the errors of the arm are
+    /// not those of a chain, and no single transform is the true one.
     pub space_mm: f64,
     pub space_stated_mm: f64,
 }
 
-/// How the views of a session come about, and what is known of it.
+/// How the views of a session are chosen, and what is known about it.
 #[derive(Clone, Copy)]
 pub struct Asked {
     pub views: usize,
     pub free_lens: bool,
-    /// What is said of the lens that is given.
+    /// The stated accuracy of the given lens.
     pub accuracy_px: Option<f64>,
     /// Chosen by guided capture, not at random.
     pub guided: bool,
-    /// Whether the chain is all that is wrong with the arm.
+    /// Whether the chain is the only error of the arm.
     pub of_links: bool,
 }
 
@@ -75,7 +75,7 @@ pub fn session(cell: &Cell, asked: Asked, seed: u64) -> Result<Touched, Failure>
         report(&calibration, arm);
     }
     let hand_eye = calibration.hand_eye.ok_or("no answer")?;
-    // Random numbers of its own: what is touched does not depend on it.
+    // Random numbers of its own: the touched points do not depend on it.
     let true_camera = if of_links {
         true_mount_from_camera(cell, &of_views.placement.arm, &mut ChaCha8Rng::seed_from_u64(1))
     } else {
@@ -107,7 +107,7 @@ pub fn session(cell: &Cell, asked: Asked, seed: u64) -> Result<Touched, Failure>
         let as_it_is = Touch { view, in_camera, down, tool: plain_tool };
         let by_controller = [&hand_eye, &park].map(|hand_eye| as_it_is.by_controller(cell, hand_eye));
         let [Some(plain), Some(by_park)] = by_controller else { continue };
-        // By corrected poses and commands.
+        // With corrected poses and commands.
         let seen = cell.camera_at(&actual(&view.joints), arm.hand_eye.mount_from_camera().isometry()) * in_camera;
         let goal = Isometry3::from_parts(seen.coords.into(), down) * Translation3::from(-corrected_tool);
         let Ok(command) = corrected.command(&Pose::from_isometry(goal), &plain) else { continue };
@@ -131,8 +131,8 @@ pub fn session(cell: &Cell, asked: Asked, seed: u64) -> Result<Touched, Failure>
     })
 }
 
-/// What a transform is off by where the chain is not known: from that of so many views that it is the one that goes with the poses
-/// which this arm reports, and from the true one, millimetres at the board; and what is stated.
+/// The error of a transform if the chain is not known: relative to the one from so many views that it is right for the poses which
+/// this arm reports, and to the true one, millimetres at the board; and the stated error.
 pub struct Unknown {
     pub from_reported: f64,
     pub from_truth: f64,
@@ -141,13 +141,13 @@ pub struct Unknown {
 
 const VERY_MANY: usize = 300;
 
-/// A session of which the joints are not known and the accuracy of the robot is.
+/// A session whose joints are not known, but the accuracy of the robot is.
 pub struct ByAccuracy {
     /// Root mean square distance and angle between where the tip is and where it is reported, millimetres and degrees.
     pub accuracy: [f64; 2],
     /// Root mean square distance of touches, millimetres.
     pub touch_mm: f64,
-    /// Stated of them, and which part of them is within.
+    /// The error stated for them, and the share within it.
     pub stated_mm: f64,
     pub within: f64,
 }
@@ -192,7 +192,7 @@ pub fn by_accuracy(cell: &Cell, asked: Asked, seed: u64) -> Result<ByAccuracy, F
 }
 
 /// Root mean square distance and angle between where the tip is and where it is reported, with base and tip where that is least: a
-/// hand-eye calibration takes up the rest. A turn counts as at 0.3 m.
+/// hand-eye calibration takes up the rest. A rotation counts as at 0.3 m.
 fn accuracy(cell: &Cell, taken: &[Taken]) -> Option<[f64; 2]> {
     const LEVER_M: f64 = 0.3;
     let rigid = |x: &DVector<f64>, at: usize| shift_and_turn(&x.fixed_rows::<6>(at).into_owned());
@@ -230,17 +230,17 @@ fn accuracy(cell: &Cell, taken: &[Taken]) -> Option<[f64; 2]> {
     Some([mean_square(0).sqrt(), mean_square(3).sqrt()])
 }
 
-/// A point that was seen, and how it shall be touched.
+/// A point that was seen, and how it should be touched.
 struct Touch<'a> {
     view: &'a Taken,
     in_camera: Point3<f64>,
     down: UnitQuaternion<f64>,
-    /// The tip of the tool as it was found.
+    /// The tip of the tool as found.
     tool: Vector3<f64>,
 }
 
 impl Touch<'_> {
-    /// Joint values by the poses that the controller reports.
+    /// Joint values from the poses that the controller reports.
     fn by_controller(&self, cell: &Cell, hand_eye: &HandEye) -> Option<Vec<f64>> {
         let mounted = hand_eye.mount_from_camera();
         let tip = cell.believed.forward(&self.view.joints);
@@ -275,7 +275,7 @@ pub fn unknown(cell: &Cell, asked: Asked, seed: u64) -> Result<Unknown, Failure>
     })
 }
 
-/// The arm that the program knows, where it stands.
+/// The arm that the program knows, with its base.
 pub struct Placed {
     pub arm: Arm,
 }
@@ -297,7 +297,7 @@ fn reported(cell: &Cell, joints: &[f64]) -> Pose<Base, Tip> {
     Pose::from_isometry(cell.believed.forward(joints))
 }
 
-/// What the estimator is given: corners, reported poses, joint values, and the arm that the program knows.
+/// The input of the estimator: corners, reported poses, joint values, and the arm that the program knows.
 pub fn observed(cell: &Cell, placed: &Placed, taken: &[Taken], free_lens: bool) -> (Observations, ArmOfViews) {
     let view = |(i, taken): (usize, &Taken)| {
         let pose = reported(cell, &taken.reported);
@@ -322,8 +322,9 @@ pub fn observed(cell: &Cell, placed: &Placed, taken: &[Taken], free_lens: bool) 
     (observations, of_views)
 }
 
-/// Where the transform of a perfect calibration is: that of the cell, but for what belongs to the gauge. With `A` the arm as it is and
-/// `F` as it is believed, `A(q) = Z F_e(q) T` with errors `e` of the joints between; `T` goes with the tip, and `Z` with the base.
+/// Where the transform of a perfect calibration is: that of the cell, except for what belongs to the gauge. With `A` the true arm
+/// and `F` the believed one, `A(q) = Z F_e(q) T` with errors `e` of the joints between; `T` goes with the tip, and `Z` with the
+/// base.
 fn true_mount_from_camera(cell: &Cell, arm: &Arm, rng: &mut ChaCha8Rng) -> Option<Isometry3<f64>> {
     const CONFIGURATIONS: usize = 40;
     let rigid = |x: &[f64]| shift_and_turn(&Vector6::from_column_slice(x));
@@ -343,7 +344,8 @@ fn true_mount_from_camera(cell: &Cell, arm: &Arm, rng: &mut ChaCha8Rng) -> Optio
         }
         Some(DVector::from_vec(off))
     };
-    // A turn of the base can be told as errors of all joints behind the first: it is what is likeliest for an arm.
+    // A rotation of the base can be expressed as errors of all joints after the first: the likeliest for an arm is
+    // used.
     let likely = |k: usize| match k.checked_sub(12).map(|k| arm_parameters(joint_count)[k].error) {
         None => 0.0,
         Some(LinkError::ShiftX | LinkError::ShiftY) => 1e-9 / LEVELS_OF_ARMS[1].powi(2) * LEVELS_OF_ARMS[0].powi(2),

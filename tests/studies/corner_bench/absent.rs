@@ -1,4 +1,4 @@
-//! What it takes to see that there is no board.
+//! What it takes to find that there is no board.
 
 use image::GrayImage;
 

@@ -1,9 +1,8 @@
-//! Chessboard detection on rendered boards and on the reference sets, beside OpenCV.
+//! Chessboard detection on rendered boards and on the reference sets, compared with OpenCV.
 //!
 //! `cargo run --release -p handeye_studies --example corner_bench -- [VIEWS] [native] [PART …]`: VIEWS rendered boards per case,
-//! 24 unless told; with `native` without the detectors of OpenCV, which take most of the time. The parts are `rendered`,
-//! `hard`, `absent` and `recorded`; all of them unless told. The sets are looked for in `$HANDEYE_DATA`, then in
-//! `../shared/data`.
+//! 24 by default; with `native` without the detectors of OpenCV, which take most of the time. The parts are `rendered`, `hard`,
+//! `absent` and `recorded`; all of them by default. The sets are searched for in `$HANDEYE_DATA`, then in `../shared/data`.
 
 mod absent;
 mod opencv_detectors;
@@ -37,7 +36,7 @@ pub const DETECTORS: [Detector; 3] = [
     Detector { name: "findChessboardCornersSB", find: opencv_detectors::sectors },
 ];
 
-/// Those that were asked for.
+/// The requested ones.
 pub fn detectors() -> &'static [Detector] {
     if std::env::args().any(|argument| argument == "native") { &DETECTORS[..1] } else { &DETECTORS }
 }
@@ -95,7 +94,7 @@ fn all_rendered(views: u64) {
 
 fn rendered(detector: &Detector, look: &Look, images: &[Image]) {
     let grid = look.grid();
-    // Of an odd size it does not have, the board is not there: as much texture, but nothing to find.
+    // The board does not have this odd size, so it is not found: as much texture, but nothing to find.
     let other = Grid { columns: look.columns + 1, ..grid };
     let (mut found, mut hit_ms, mut miss_ms) = (0, Vec::new(), Vec::new());
     let (mut errors, mut normalised): (Vec<Vector2<f64>>, Vec<f64>) = (Vec::new(), Vec::new());
@@ -142,7 +141,7 @@ pub fn load(folder: &Path) -> Vec<GrayImage> {
 /// A search of more than this is timed once \[ms\].
 const LONG_MS: f64 = 1000.0;
 
-/// What is found, and the shortest of three times in milliseconds: the machine may do something else besides.
+/// What is found, and the shortest of three times in milliseconds: the machine may be busy.
 pub fn timed(detector: &Detector, image: &GrayImage, grid: &Grid) -> (Option<Vec<Corner>>, f64) {
     let mut shortest = f64::INFINITY;
     let mut corners = None;

@@ -1,4 +1,4 @@
-//! Boards found in the reference sets, and how well a detector repeats itself on a robot that returns to one pose.
+//! Boards found in the reference sets, and the repeatability of a detector on a robot that returns to one pose.
 
 use handeye_geometry::statistics::median_high;
 use handeye_geometry::targets::Grid;
@@ -17,7 +17,7 @@ pub const SETS: [(&str, usize, usize); 8] = [
     ("opencv_stereo_9x6", 9, 6),
     ("alim_repeatability_intrinsics/cam1_intrinsics", 9, 7),
     ("alim_repeatability_intrinsics/repeatability", 9, 7),
-    // No board of this size is in these: the time of a miss.
+    // No board of this size is in these: the time of a search without a result.
     ("rct_circles_eye_in_hand/images", 9, 6),
 ];
 

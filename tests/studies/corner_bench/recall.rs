@@ -1,4 +1,4 @@
-//! What is found of boards that are hard to see.
+//! The detection rate for boards that are hard to see.
 
 use image::{GrayImage, Luma};
 use nalgebra::{Matrix2, Vector2};
@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::render::{Image, Look, view};
 use crate::{Detector, detectors};
 
-/// What is done to an image of a seed.
+/// Changes the image of a seed.
 type Change = fn(&mut Image, u64);
 
 pub fn all(views: u64) {
@@ -79,7 +79,7 @@ fn report(detector: &Detector, look: &Look, images: &[Image]) {
     );
 }
 
-/// Half of the image in a fifth of the light, with a penumbra of 30 px through the middle of the board.
+/// Half of the image at a fifth of the light, with a penumbra of 30 px through the middle of the board.
 fn shadow(image: &mut Image, seed: u64) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (sin, cos) = rng.random_range(0.0..std::f64::consts::TAU).sin_cos();

@@ -1,4 +1,4 @@
-//! Views of chessboards that vary, with the exact area of every pixel and known corners.
+//! Varied views of chessboards, with the exact area of every pixel and known corners.
 
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::targets::Grid;
@@ -18,14 +18,14 @@ pub struct Look {
     pub radial: f64,
     pub columns: usize,
     pub rows: usize,
-    /// Middle size of a square \[px\].
+    /// Mean size of a square \[px\].
     pub square_px: f64,
     pub max_tilt: f64,
     pub blur_px: f64,
     pub noise: f64,
     pub dark: f64,
     pub light: f64,
-    /// Change of the light across the width of the image, as a part of it.
+    /// Change of the light across the width of the image, as a fraction of it.
     pub fall: f64,
     /// Shift of the board to the right, in units of the focal length.
     pub moved: f64,
@@ -62,7 +62,7 @@ pub struct Image {
     pub truth: Vec<Vector2<f64>>,
 }
 
-/// A view of the board from a random side; squares vary by a fifth either way.
+/// A view of the board from a random side; the size of squares varies by ±20 %.
 pub fn view(look: &Look, seed: u64) -> Image {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let distance = look.focal_px / look.square_px * rng.random_range(0.8..1.2);

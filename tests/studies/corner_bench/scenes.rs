@@ -16,7 +16,7 @@ pub struct Scene {
     pub image: fn((u32, u32), u64) -> GrayImage,
 }
 
-/// What is looked for in all of them.
+/// What is searched for in all of them.
 pub const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 1.0 };
 
 pub const SCENES: [Scene; 8] = [
@@ -50,8 +50,8 @@ fn static_noise((width, height): (u32, u32), seed: u64) -> GrayImage {
     GrayImage::from_fn(width, height, |_, _| Luma([rng.random()]))
 }
 
-/// Random levels on lattices of 1024 to 2 px, smoothly between, each half as strong as the one before it: contrast that
-/// falls with the frequency as in images of nature.
+/// Random levels on lattices of 1024 to 2 px, interpolated smoothly, each half as strong as the one before it: contrast
+/// that falls with the frequency as in natural images.
 fn texture((width, height): (u32, u32), seed: u64) -> GrayImage {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut sum = vec![0f32; (width * height) as usize];
@@ -110,7 +110,8 @@ fn halved_and_back(image: &GrayImage) -> GrayImage {
     })
 }
 
-/// Rows of bricks in two shades, every other row shifted by half a brick: a lattice of corners that is no chessboard.
+/// Rows of bricks in two shades, every other row shifted by half a brick: a lattice of corners that is not a
+/// chessboard.
 fn bricks((width, height): (u32, u32), seed: u64) -> GrayImage {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (long, tall) = (width / 24, width / 48);
@@ -127,7 +128,7 @@ fn bricks((width, height): (u32, u32), seed: u64) -> GrayImage {
     image
 }
 
-/// A board, moved by a part of the width.
+/// A board, shifted by a fraction of the width.
 fn board(size: (u32, u32), rows: usize, moved: f64, seed: u64) -> GrayImage {
     let scale = f64::from(size.0) / 640.0;
     let usual = Look::published(0.7, 2.0);
@@ -135,7 +136,7 @@ fn board(size: (u32, u32), rows: usize, moved: f64, seed: u64) -> GrayImage {
     view(&Look { moved: moved * f64::from(size.0) / look.focal_px, ..look }, seed).image
 }
 
-/// The image with its board painted over: what is two squares around it too, by the levels left and right of that.
+/// The image with its board painted over, including two squares around it, with the levels left and right of that.
 pub fn painted_over(image: &GrayImage, corners: &[Corner], grid: &Grid) -> GrayImage {
     let at = |column: usize, row: usize| corners[row * grid.columns + column].px;
     let (last_column, last_row) = (grid.columns - 1, grid.rows - 1);

@@ -1,4 +1,4 @@
-//! Forty sessions that are degenerate or hostile, and the code that each has to get.
+//! Forty degenerate or hostile sessions, and the code that each has to get.
 
 use handeye_estimate::Observations;
 use handeye_estimate::diagnose::doctor::Diagnosis;
@@ -43,7 +43,7 @@ fn healthy(mode: Mode, seed: u64) -> Observations {
     observed(&Setup::new(mode, 20, seed))
 }
 
-/// Views of the board with turns of the camera about given axes.
+/// Views of the board with rotations of the camera about given axes.
 fn turned(
     mode: Mode,
     seed: u64,
@@ -67,7 +67,7 @@ fn still(_: f64) -> Vector3<f64> {
     Vector3::zeros()
 }
 
-/// A wave that goes to and fro several times a session.
+/// A wave that goes back and forth several times per session.
 fn wave(part: f64) -> Vector3<f64> {
     Vector3::new((5.0 * part).sin(), (7.0 * part).cos(), 1.5 * (4.0 * part).sin()) * 0.03
 }
@@ -120,7 +120,7 @@ fn with_mode(mut observations: Observations, mode: Mode) -> Observations {
     observations
 }
 
-/// Robot poses one row further.
+/// Robot poses shifted by one row.
 fn out_of_step(mut observations: Observations) -> Observations {
     let poses: Vec<_> = observations.views.iter().map(|v| v.base_from_tip).collect();
     let count = poses.len();
@@ -195,7 +195,7 @@ fn degenerate() -> Vec<Case> {
     ]
 }
 
-/// Poses that were written or read another way than stated.
+/// Poses that were written or read differently than stated.
 fn gross() -> Vec<Case> {
     let inverted = [Code::InvertedPoses, Code::WrongMode];
     let unit = [Code::WrongLengthUnit];
@@ -226,7 +226,7 @@ fn gross() -> Vec<Case> {
     ]
 }
 
-/// The session with the poses of the target, measured elsewhere, in place of the corners.
+/// The session with the poses of the target, measured elsewhere, instead of the corners.
 fn with_target_poses(
     mut observations: Observations,
     change: impl Fn(Isometry3<f64>) -> Isometry3<f64>,

@@ -14,7 +14,7 @@ use nalgebra::{Isometry3, SMatrix, Vector3, Vector6};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-/// The diagnosis with the calibration beside it, as the command line makes it.
+/// The diagnosis with the calibration, as made by the command line.
 pub fn examined(observations: &Observations) -> Diagnosis {
     let cancel = CancelToken::default();
     match calibrate(observations, Method::Joint, &cancel) {
@@ -57,17 +57,17 @@ pub const FAULTS: [&str; 9] = [
     "images letter by letter, poses by number",
 ];
 
-/// A session with a fault, one that comes in any size so many times as large as its name says, and the code that has to come
-/// first. Both set-ups, with the lens given and estimated, take turns.
+/// A session with a fault, one of variable size this many times as large as its name states, and the code that has to come
+/// first. Both set-ups, with the lens given and estimated, alternate.
 pub fn faulty(fault: usize, times: f64, seed: u64) -> (Observations, FindingCode) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x5eed);
     let mode = if seed.is_multiple_of(2) { Mode::EyeInHand } else { Mode::EyeToHand };
     let estimated = seed % 4 > 1;
-    // What the arm's repeatability and a small error of its geometry make together.
+    // The combination of the arm's repeatability and a small error of its geometry.
     let setup = Setup { estimated, joints: true, ..Setup::new(mode, 20, seed) };
     match fault {
         0 => {
-            // A board slips in its plane and turns a little.
+            // A board slips in its plane and rotates a little.
             let angle = rng.random_range(0.0..std::f64::consts::TAU);
             let slip = Vector3::new(angle.cos(), angle.sin(), 0.0) * 5e-3 * times;
             let turn = Vector3::z() * rng.random_range(-0.01..0.01) * times;
@@ -83,7 +83,7 @@ pub fn faulty(fault: usize, times: f64, seed: u64) -> (Observations, FindingCode
             (observed(&setup.with(Fault { joint: Some((3, offset)), ..Fault::default() })), FindingCode::JointOffset)
         }
         3 => {
-            // An image one frame of 30 Hz late, of an arm at 0.1 m/s and 10°/s.
+            // An image one frame late at 30 Hz, with an arm at 0.1 m/s and 10°/s.
             let motion = twist(direction(&mut rng) * 3.3e-3, direction(&mut rng) * 0.33f64.to_radians()) * times;
             let moving = vec![(rng.random_range(0..20), motion)];
             (observed(&setup.with(Fault { moving, ..Fault::default() })), FindingCode::OutlierView)
@@ -97,7 +97,7 @@ pub fn faulty(fault: usize, times: f64, seed: u64) -> (Observations, FindingCode
             (changed(observed(&setup), in_millimetres), FindingCode::WrongLengthUnit)
         }
         6 | 7 => {
-            // An image or a pose, or two, that is missing or there twice: at a view, or before the first.
+            // One or two images or poses that are missing or duplicated: at a view, or before the first.
             let by = [-2, -1, 1, 2][rng.random_range(0..4usize)];
             let from = if fault == 6 { rng.random_range(4..=14) } else { 0 };
             let rows = (0..20).map(|row: usize| if row < from { Some(row) } else { row.checked_add_signed(by) });
@@ -110,7 +110,7 @@ pub fn faulty(fault: usize, times: f64, seed: u64) -> (Observations, FindingCode
             for (n, view) in session.views.iter_mut().enumerate() {
                 view.name = format!("{}.png", n + 1);
             }
-            // Row by row the images in the order of their letters, the poses as they were taken.
+            // Row by row the images in alphabetical order, the poses in the order taken.
             let poses: Vec<_> = session.views.iter().map(|view| view.base_from_tip).collect();
             session.views = by_letters.iter().map(|view| session.views[*view].clone()).collect();
             for (view, pose) in session.views.iter_mut().zip(poses) {
@@ -121,7 +121,7 @@ pub fn faulty(fault: usize, times: f64, seed: u64) -> (Observations, FindingCode
     }
 }
 
-/// The views with the poses of other rows; views without one are left out.
+/// The views with the poses of other rows; views without a pose are left out.
 fn paired(mut session: Observations, rows: impl Iterator<Item = Option<usize>>) -> Observations {
     let poses: Vec<_> = session.views.iter().map(|view| (view.base_from_tip, view.tip_from_joints.clone())).collect();
     let views = session.views.into_iter().zip(rows).filter_map(|(view, row)| {
@@ -155,9 +155,9 @@ pub fn healthy(seed: u64) -> Observations {
     })
 }
 
-/// A healthy session as it is met: an arm whose error depends on where it stands and is 1 to 3 mm, views level by level,
-/// corner errors that neighbours share, a sheet that is not flat. Joints are not given where links have errors: an offset
-/// of a joint is then true. The second value is what it was made of.
+/// A realistic healthy session: an arm whose error depends on where it is and is 1 to 3 mm, views level by level, corner
+/// errors that neighbours share, a sheet that is not flat. Joints are not given if links have errors: an offset of a
+/// joint is then real. The second value is its set-up.
 pub fn as_met(seed: u64) -> (Observations, Setup) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x3e71);
     let mode = if rng.random::<bool>() { Mode::EyeInHand } else { Mode::EyeToHand };
@@ -165,7 +165,7 @@ pub fn as_met(seed: u64) -> (Observations, Setup) {
     let rad_per_m = 0.07f64.to_radians() / 1e-3;
     let arm_error = match rng.random_range(0..4) {
         0 => ArmError::None,
-        // The tip is 0.2 m from the middle of its places, RMS, along all three axes together.
+        // The tip is 0.2 m from the mean of its positions, RMS, along all three axes together.
         1 => ArmError::Affine(SMatrix::from_fn(|i, _| {
             normal(&mut rng) * size_m * if i < 3 { 1.0 } else { rad_per_m } / 0.2
         })),
@@ -190,9 +190,9 @@ pub fn as_met(seed: u64) -> (Observations, Setup) {
     (observed(&setup), setup)
 }
 
-/// A healthy session of an arm of servo motors: gears that are not centred, play, links that give way under their weight and
-/// sensors of 4096 steps a turn, which put the tip off by some millimetres; views level by level or in no order, a printed board
-/// on a sheet. No model of any estimate has a part of this.
+/// A healthy session of an arm of servo motors: eccentric gears, play, links that bend under their weight and sensors with 4096
+/// steps per turn, which cause errors of the tip of some millimetres; views level by level or in no order, a printed board on a
+/// sheet. None of this is in the model of any estimate.
 pub fn servo(seed: u64) -> Setup {
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x5e70);
     let mode = if rng.random::<bool>() { Mode::EyeInHand } else { Mode::EyeToHand };
@@ -219,7 +219,7 @@ pub fn servo(seed: u64) -> Setup {
     }
 }
 
-/// Whether a finding accuses something of a healthy session made so.
+/// Whether a finding reports a cause that this healthy session does not have.
 pub fn names_a_cause(finding: &Finding, setup: &Setup) -> bool {
     use FindingCode as C;
     let cause = [
@@ -238,7 +238,7 @@ pub fn names_a_cause(finding: &Finding, setup: &Setup) -> bool {
     finding.severity >= Severity::Warning && (flat || cause.contains(&finding.code))
 }
 
-/// Whether a finding says that something moved.
+/// Whether a finding reports that something moved.
 pub fn names_a_move(finding: &Finding) -> bool {
     matches!(finding.code, FindingCode::BoardMoved | FindingCode::CameraMoved)
 }

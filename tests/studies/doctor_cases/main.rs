@@ -1,10 +1,11 @@
-//! What the doctor says of constructed sessions: forty that are degenerate or hostile, healthy ones, and nine faults.
+//! What the doctor reports for constructed sessions: forty that are degenerate or hostile, healthy ones, and nine
+//! faults.
 //!
-//! `cargo run --release -p handeye_studies --example doctor_cases -- [HEALTHY SESSIONS] [SEEDS PER FAULT] [FAULT]`, or
-//! `… -- TEXT` for the whole report on every case whose name has that text; `… -- as-met [SESSIONS] [FIRST]` for the healthy
-//! sessions with an arm whose error depends on where it stands; one alone with its report; `… -- servo [SESSIONS] [FIRST]` for those
-//! of an arm of servo motors, and for a board that slipped in them; `… -- lenses [GROUPS] [FIRST]` for lenses that are reported to differ
-//! among eleven sessions of one camera on such arms; `… -- limits [SESSIONS]` for the sizes from which on faults are found.
+//! `cargo run --release -p handeye_studies --example doctor_cases -- [HEALTHY SESSIONS] [SEEDS PER FAULT] [FAULT]`, or `… -- TEXT`
+//! for the whole report on every case whose name has that text; `… -- as-met [SESSIONS] [FIRST]` for the healthy sessions with an
+//! arm whose error depends on where it is; a single one with its report; `… -- servo [SESSIONS] [FIRST]` for those of an arm of
+//! servo motors, and for a board that slipped in them; `… -- lenses [GROUPS] [FIRST]` for lenses that are reported to differ among
+//! eleven sessions of one camera on such arms; `… -- limits [SESSIONS]` for the sizes from which faults are found.
 
 mod cases;
 mod faults;
@@ -43,8 +44,8 @@ fn as_met(first: u64, sessions: u64) {
     println!("a cause named in {alarmed} of {sessions} healthy sessions as they are met: {alarms:?}\n");
 }
 
-/// Moves that are named in sessions of an arm of servo motors: in healthy ones, and where the board slipped by so many millimetres
-/// in the middle.
+/// Moves that are reported in sessions of an arm of servo motors: in healthy ones, and where the board slipped by this many
+/// millimetres in the middle.
 fn servo(first: u64, sessions: u64) {
     for slip_m in [0.0, 0.01, 0.02] {
         let mut codes = BTreeMap::<String, usize>::new();
@@ -105,11 +106,11 @@ fn first_message(fault: usize, times: f64, seed: u64) -> Result<(), String> {
 /// How sessions with a fault are made, by the remainder of their seed.
 const SET_UPS: [&str; 4] =
     ["in hand, lens given", "to hand, lens given", "in hand, lens estimated", "to hand, lens estimated"];
-/// How many of the faults come in any size; they are first.
+/// How many of the faults have a variable size; they are first.
 const SIZED: usize = 4;
 
-/// From which size on faults are found, in every set-up by itself: the size at which it is a half of all sessions, and their share
-/// at twice that.
+/// The size from which faults are found, separately for every set-up: the size at which half of all sessions have it found, and
+/// their share at twice that.
 fn limits(sessions: u64) {
     for (fault, name) in faults::FAULTS.iter().enumerate().take(SIZED) {
         let mut at_twice = 0;
@@ -123,7 +124,7 @@ fn limits(sessions: u64) {
             let limit = loop {
                 let smaller = share(times / 2.0);
                 if smaller < 0.5 && larger >= 0.5 {
-                    // Between the two by the logarithm of the size.
+                    // Interpolated between the two in the logarithm of the size.
                     break Some(times / 2.0 * 2f64.powf((0.5 - smaller) / (larger - smaller)));
                 }
                 (times, larger) = (times / 2.0, smaller);

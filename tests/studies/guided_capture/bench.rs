@@ -1,4 +1,4 @@
-//! One set-up of the comparison: what all ways to choose poses share, and the ways.
+//! One set-up of the comparison: what all strategies to choose poses share, and the strategies.
 
 use std::path::Path;
 
@@ -21,50 +21,50 @@ use super::COUNTS;
 
 /// What a capture takes after the arm has arrived, seconds.
 const DWELL_S: f64 = 1.5;
-/// Views at random that all ways choose from.
+/// Random views that all strategies choose from.
 const CANDIDATES: usize = 1000;
-/// First views of guided capture that are small turns, because nothing is known yet.
+/// First views of guided capture that are small rotations, because nothing is known yet.
 const FIRST_VIEWS: usize = 3;
 /// The ten poses of the reference script.
 const REFERENCE_POSES: &str = include_str!("../../../assets/poses/seed10.toml");
 
-/// One way through a session: the error after each view and when.
+/// One strategy's run through a session: the error after each view and when.
 pub struct Way {
     /// By number of views from 1 on: expected error \[m\] and time \[s\].
     pub after: Vec<(f64, f64)>,
-    /// True error of the answer from as many views as each of [`COUNTS`] has, metres; `None` where there are not so many, or no
+    /// True error of the answer from as many views as each of [`COUNTS`], metres; `None` if there are not that many, or no
     /// answer.
     pub truth_m: [Option<f64>; COUNTS.len()],
 }
 
-/// A view on a way, and when it is taken, seconds.
+/// A view of a run, and when it is taken, seconds.
 struct Visit {
     base_from_tip: Pose<Base, Tip>,
     view: ExpectedView,
     time_s: f64,
 }
 
-/// All ways of one session.
+/// All runs of one session.
 pub struct Ways {
     /// In the order of [`NAMES`].
     pub of: [Way; 5],
     /// The best error of each of [`COUNTS`] \[m\].
     pub optimum: Vec<f64>,
-    /// The same where the first three views are those of guided capture.
+    /// The same if the first three views are those of guided capture.
     pub optimum_after: Vec<f64>,
 }
 
-/// What the ways are called.
+/// Names of the strategies.
 pub const NAMES: [&str; 5] = ["guided", "farthest rotation", "random", "easy_handeye", "reference script"];
 
-/// A view that the arm gets to.
+/// A view that the arm can reach.
 struct Reachable {
     joints: JointValues,
     base_from_tip: Pose<Base, Tip>,
     view: ExpectedView,
 }
 
-/// What all ways of a session share.
+/// What all runs of a session share.
 pub struct Bench {
     /// Before its first view.
     cell: GuidedCell,
@@ -76,7 +76,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Of a cell before its first view.
+    /// For a cell before its first view.
     pub fn new(cell: GuidedCell, seed: u64) -> Self {
         let truth = cell.truth();
         let first_tip = cell.base_from_tip();
@@ -106,7 +106,7 @@ impl Bench {
         Self { cell, seed, truth, weight, pool, first }
     }
 
-    /// All ways, from the same first view.
+    /// All runs, from the same first view.
     pub fn ways(&self) -> Ways {
         let cell = &self.cell;
         let (guided, views) = self.guided();
@@ -128,7 +128,7 @@ impl Bench {
         let after = after.collect();
         let mut cell = self.cell.clone();
         for visit in visits {
-            // The board may be cut off by noise at the edge of the image: a view less.
+            // The board may be cut off by noise at the edge of the image: one view fewer.
             cell.capture_at(&visit.base_from_tip);
         }
         Way { after, truth_m: self.truth_m(&cell) }
@@ -162,7 +162,7 @@ impl Bench {
         self.along(&visits)
     }
 
-    /// The first view of all ways that begin with it.
+    /// The first view of all runs that start with it.
     fn first_visit(&self) -> Visit {
         Visit { base_from_tip: self.cell.base_from_tip(), view: self.first.clone(), time_s: DWELL_S }
     }
@@ -170,7 +170,7 @@ impl Bench {
     fn guided(&self) -> (Way, Vec<ExpectedView>) {
         let mut cell = self.cell.clone();
         let most = *COUNTS.last().expect("some");
-        // A goal that is never reached, and gains that are always worth it: the choice alone is looked at.
+        // A goal that is never reached, and gains that are always worth it: only the choice is examined.
         let options = GuidedOptions {
             goal_m: 0.0,
             most_views: most,
@@ -190,12 +190,12 @@ impl Bench {
             }
         });
         let visits: Vec<Visit> = visited.collect();
-        // What it saw itself, not the same places seen once more.
+        // Its own images, not the same places seen once more.
         let way = Way { truth_m: self.truth_m(&cell), ..self.along(&visits) };
         (way, visits.into_iter().map(|visit| visit.view).collect())
     }
 
-    /// Each time the view whose rotation is farthest from all before it.
+    /// Each time the view whose rotation is farthest from all previous ones.
     fn farthest(&self, cell: &GuidedCell) -> Way {
         let mut taken = vec![cell.base_from_tip()];
         let mut chosen: Vec<usize> = Vec::new();
@@ -215,9 +215,9 @@ impl Bench {
         self.through(cell, &(0..most.min(self.pool.len())).collect::<Vec<_>>())
     }
 
-    /// The poses of `easy_handeye`: the tip of the first view turned about each of its axes by ±25° and ±12.5°, and shifted
-    /// along the axes of the base by ±50 mm, ±100 mm and 33 mm; after the first one those that show the board and that the
-    /// arm gets to.
+    /// The poses of `easy_handeye`: the tip of the first view rotated about each of its axes by ±25° and ±12.5°, and
+    /// shifted along the axes of the base by ±50 mm, ±100 mm and 33 mm; after the first one those that show the board and
+    /// that the arm can reach.
     fn easy_handeye(&self, cell: &GuidedCell) -> Way {
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
         let turns = [25.0, 12.5].into_iter().flat_map(|deg: f64| {
@@ -238,8 +238,9 @@ impl Bench {
         )
     }
 
-    /// The ten views of the reference script, as the camera of its scene has the board; those that are wholly in this
-    /// camera's image and that this arm gets to. Somebody has taught them, so that no first view comes before.
+    /// The ten views of the reference script, with the board as seen by the camera of its scene; those that are
+    /// completely in this camera's image and that this arm can reach. They were taught by hand, so that there is no
+    /// first view before them.
     fn reference(&self, cell: &GuidedCell) -> Way {
         let taught = TaughtPoses::parse(Path::new("seed10.toml"), REFERENCE_POSES).expect("a file of this project");
         let scene = Scene::reference().and_then(|scene| scene.resolve(scene.seed)).expect("a scene of this project");
@@ -250,7 +251,7 @@ impl Bench {
         self.at(cell, false, views.map(|view| self.truth.base_from_tip(&view)))
     }
 
-    /// Through tip poses that nobody has checked: those that show the board and that the arm gets to.
+    /// Through unchecked tip poses: those that show the board and that the arm can reach.
     fn at(&self, cell: &GuidedCell, with_first: bool, poses: impl Iterator<Item = Pose<Base, Tip>>) -> Way {
         let all: Vec<usize> = (0..BOARD.len()).collect();
         let (mut at, mut time_s) = (cell.robot.joints, 0.0);
@@ -282,7 +283,7 @@ impl Bench {
         BOARD.points().iter().all(is_inside)
     }
 
-    /// The least error of a set of `count` views \[m\], of which some are given and the others are of the pool.
+    /// The smallest error of a set of `count` views \[m\], some of which are given and the others from the pool.
     fn optimum(&self, given: &[ExpectedView], count: usize) -> f64 {
         let none = Design::new(self.truth.prior(), given, self.weight).expect("the prior is one");
         let free = count - given.len();

@@ -1,4 +1,4 @@
-//! How good poses are that are chosen in different ways.
+//! How good poses are that are chosen with different strategies.
 
 use handeye_plan::testing::guided_cell::{CellSetup, GuidedCell};
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
@@ -10,7 +10,7 @@ use super::{COUNTS, SETUPS};
 /// Times at which the error is compared, seconds.
 const TIMES_S: [f64; 6] = [15.0, 20.0, 30.0, 40.0, 50.0, 60.0];
 
-/// Among places of the study's own.
+/// With places of the study's own.
 pub fn choice(sessions: u64) {
     println!("errors in mm, mean (90th percentile) of {sessions} sessions; lens known, 0.1 px, 0.1 mm, 0.02°");
     for (arm, mode) in SETUPS {
@@ -43,7 +43,7 @@ fn compare(name: &str, sessions: u64, cell: impl Fn(u64) -> GuidedCell + Sync) {
     against_random(&all);
 }
 
-/// What the answers are off by, where there are answers.
+/// The true errors of the answers, if there are answers.
 fn true_errors(all: &[Ways]) {
     println!("true error");
     for (k, name) in NAMES.into_iter().enumerate() {
@@ -63,7 +63,7 @@ fn true_errors(all: &[Ways]) {
 fn by_views(all: &[Ways]) {
     println!("{:22}{}", "views", COUNTS.map(|n| format!("{n:>16}")).concat());
     let row = |name: &str, of: &dyn Fn(&Ways, usize) -> Option<f64>| {
-        // Of all sessions or of none: those with so many views are others than those with fewer.
+        // For all sessions or for none: those with this many views differ from those with fewer.
         let at = |place: usize| all.iter().map(|ways| of(ways, place)).collect::<Option<Vec<f64>>>();
         println!("{name:22}{}", [0, 1, 2, 3, 4, 5].map(|place| spread(at(place).unwrap_or_default())).concat());
     };
@@ -78,7 +78,7 @@ fn by_views(all: &[Ways]) {
     });
 }
 
-/// What the error is at a moment, where there is any answer by then.
+/// The error at a given time, if there is any answer by then.
 fn by_time(all: &[Ways]) {
     println!("{:22}{}", "seconds", TIMES_S.map(|s| format!("{s:>16}")).concat());
     for (k, name) in NAMES.into_iter().enumerate().take(3) {
@@ -90,7 +90,7 @@ fn by_time(all: &[Ways]) {
     }
 }
 
-/// What lists of poses give that somebody has made beforehand, with all of their poses that can be used.
+/// The result of lists of poses that were prepared beforehand, with all of their usable poses.
 fn with_all(all: &[Ways]) {
     for (k, name) in NAMES.into_iter().enumerate().skip(3) {
         let last = || all.iter().filter_map(|ways| ways.of[k].after.last().map(|last| (last, ways)));

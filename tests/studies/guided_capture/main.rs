@@ -9,15 +9,15 @@
 //! cargo run --release -p handeye_studies --example guided_capture -- straight 6
 //! ```
 //!
-//! `choice`: the expected error of the tip over the box about the board, by the true model and the poses that were taken, in
-//! sessions that begin with one view of the board. Farthest rotation and random views know from the beginning where camera
-//! and board are; guided capture does not. The optimum is the best set of so many views out of the same thousand, by
+//! `choice`: the expected error of the tip over the box about the board, with the true model and the poses that were taken,
+//! in sessions that begin with one view of the board. Farthest rotation and random views know from the beginning where camera
+//! and board are; guided capture does not. The optimum is the best set of this many views out of the same thousand, by
 //! exchange, once of all and once of those that begin with the first three views of guided capture. And the true error of the
 //! answers. `scenes`: the same in the scenes of the cell, each arm in the reference and in the realistic one, with the camera
-//! where the scene has it, and with camera and board changed over. `stop`: what is true when guided capture ends by itself. A
-//! word behind the number picks rows of both. `speed`: how long the choice of a pose takes, on one thread, with a thousand
-//! candidates and six poses ahead. `hand`: a robot that a person moves. `straight`: the first poses
-//! where small turns determine no lens.
+//! where the scene has it, and with camera and board swapped. `stop`: what is true when guided capture ends by itself. A word
+//! after the number selects rows of both. `speed`: how long the choice of a pose takes, on one thread, with a thousand
+//! candidates and six poses ahead. `hand`: a robot that is moved by hand. `straight`: the first poses where small rotations
+//! determine no lens.
 
 #![expect(clippy::expect_used, clippy::print_stdout, reason = "a study prints, and stops at what cannot be")]
 
@@ -55,7 +55,7 @@ fn main() {
     }
 }
 
-/// A trembling hand that is led to ten views: how long a view takes it, and what comes of it.
+/// A trembling hand that is guided to ten views: how long each view takes, and the result.
 fn by_hand(sessions: u64) {
     println!(
         "| camera | seconds a view, median, 90 % | refused | given up | error stated, mean, mm | true below stated |"
@@ -91,7 +91,7 @@ fn by_hand(sessions: u64) {
     }
 }
 
-/// Whether the goal is reached from a board straight on and near the edge of the image, by a lens that is not known.
+/// Whether the goal is reached from a board straight on and near the edge of the image, with an unknown lens.
 fn straight(sessions: u64) {
     println!("| focal length, px of 640 | camera | reached | moves that lost the board |");
     println!("| --- | --- | --- | --- |");
@@ -150,7 +150,7 @@ fn speed(sessions: u64) {
     }
 }
 
-/// What it takes to compare a view with the one that a person is asked for.
+/// The time to compare a view with the wanted one.
 fn looks(arm: CellArm, mode: Mode, sessions: u64) {
     let mut times: Vec<f64> = Vec::new();
     for seed in 0..sessions {

@@ -1,4 +1,4 @@
-//! The scenes of the cell with each of three arms, and with camera and board changed over.
+//! The scenes of the cell with each of three arms, and with camera and board swapped.
 
 use std::f64::consts::PI;
 
@@ -15,22 +15,23 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-/// How far a joint is from where the scene has it at the first view, radians at the most: a person has shown the board.
+/// Largest distance of a joint from its value in the scene at the first view, radians: the user has shown the board.
 const BY_HAND_RAD: f64 = 0.06;
 
 /// Which faults the cell has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellFaults {
-    /// Those of `reference.toml`: none.
+    /// The faults of `reference.toml`: none.
     Reference,
-    /// Those of `realistic.toml`.
+    /// The faults of `realistic.toml`.
     Realistic,
 }
 
 impl CellFaults {
     pub const ALL: [Self; 2] = [Self::Reference, Self::Realistic];
 
-    /// What corners and robot err by: the robot by the scene, the corners as `auto` estimates it from images of the scene.
+    /// The errors of corners and robot: the robot's from the scene, the corners' as `auto` estimates it from images of the
+    /// scene.
     pub fn noise(self) -> Noise {
         match self {
             Self::Reference => Noise { corner_px: 1.3e-3, ..Noise::EXACT },
@@ -38,7 +39,7 @@ impl CellFaults {
         }
     }
 
-    /// The scene with an arm: its places are those of the scene of the arm, everything else is that of the faults.
+    /// The scene with an arm: its places are from the scene of the arm, everything else from that of the faults.
     fn scene(self, arm: CellArm) -> Scene {
         let shipped = |scene: ShippedScene| scene.scene().expect("a file of this project");
         let of_faults = shipped(match self {
@@ -59,7 +60,7 @@ impl CellFaults {
     }
 }
 
-/// The cell of a scene, with a first view that a person has found by hand.
+/// The cell of a scene, with a first view found by hand.
 pub fn cell(faults: CellFaults, arm: CellArm, mode: Mode, seed: u64) -> GuidedCell {
     let scene = faults.scene(arm);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -69,7 +70,7 @@ pub fn cell(faults: CellFaults, arm: CellArm, mode: Mode, seed: u64) -> GuidedCe
             let views = ViewSetup::from(&scene.resolve(rng.random()).expect("a scene of this project"));
             let start = views.start_joints;
             let joints = JointValues::from_fn(start.len(), |i| start[i] + rng.random_range(-BY_HAND_RAD..BY_HAND_RAD));
-            // What goes where the board goes is not there when the camera is.
+            // What moves with the board is not there when the camera does.
             let goes = |name: &str| scene.solids.iter().any(|s| s.name == name && s.relative_to == RelativeTo::Plane);
             GuidedCell::placed(setup, places(views, joints, mode, &goes)?)
         })
@@ -78,7 +79,7 @@ pub fn cell(faults: CellFaults, arm: CellArm, mode: Mode, seed: u64) -> GuidedCe
 
 fn places(views: ViewSetup, joints: JointValues, mode: Mode, goes_with_board: &dyn Fn(&str) -> bool) -> Option<Places> {
     let ViewSetup { base_from_target, tip_from_camera, arm, around, intrinsics, .. } = views;
-    // The sheet itself is what the guide has to find out.
+    // The sheet itself is for the guide to find out.
     let mut stands: Vec<Obstacle> = around.obstacles.into_iter().filter(|it| it.name != "board").collect();
     let (mount_from_camera, anchor_from_target) = match mode {
         Mode::EyeInHand => {
@@ -93,7 +94,8 @@ fn places(views: ViewSetup, joints: JointValues, mode: Mode, goes_with_board: &d
     Some(Places { arm, joints, around: Surroundings::of(stands), links, intrinsics })
 }
 
-/// The board on the tip, where the camera was and facing where it looked, and the camera where it has the same first view.
+/// The board on the tip, where the camera was and facing its viewing direction, and the camera where it has the same first
+/// view.
 fn changed_over(
     arm: &Arm,
     joints: &JointValues,

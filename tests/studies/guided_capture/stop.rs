@@ -42,7 +42,7 @@ pub fn stop(sessions: u64, only: &str) {
                         .run(GuidedOptions { goal_m, seed, ..GuidedOptions::default() })
                 })
                 .collect();
-            // Of those whose last answer states an error.
+            // For runs whose last answer states an error.
             let last = |run: &GuidedRun| run.history.last().copied().filter(|last| last.0 == run.times_s.len());
             let ended: Vec<_> = runs.iter().filter_map(|run| last(run).map(|last| (run, last))).collect();
             let share = |of: &dyn Fn(&(usize, f64, f64)) -> bool, among: &dyn Fn(&Ending) -> bool| {

@@ -1,9 +1,9 @@
-//! What is said of a lens beside a robot, on sessions drawn by code that shares nothing with the estimator.
+//! What is reported about a lens with a robot, on sessions drawn by code that shares nothing with the estimator.
 //!
-//! `cargo run --release -p handeye_studies --example lens_claims -- given [SESSIONS] [ROBOT]`: how often a given lens whose centre is off is
-//! found, how often a right one is accused, and whether the stated error holds the true one. `… -- halves [SESSIONS] [KIND]`: the
-//! stated error of lens and hand-eye transform where the lens is estimated from half a session, and what it was without counting that
-//! views disagree about the lens.
+//! `cargo run --release -p handeye_studies --example lens_claims -- given [SESSIONS] [ROBOT]`: how often a given lens with a wrong
+//! centre is found, how often a right one is reported, and whether the stated error covers the true one. `… -- halves [SESSIONS]
+//! [KIND]`: the stated error of lens and hand-eye transform if the lens is estimated from half a session, and what it was without
+//! counting that views disagree about the lens.
 
 #[expect(dead_code, reason = "the test draws more than is printed here")]
 mod scene;
@@ -18,12 +18,12 @@ use handeye_geometry::progress::CancelToken;
 use nalgebra::{DMatrix, Matrix6};
 use scene::Scene;
 
-/// Where the lens begins among the unknowns that a covariance is of.
+/// Index of the lens among the unknowns of a covariance.
 const LENS_AT: usize = 12;
 
 const MODES: [Mode; 2] = [Mode::EyeInHand, Mode::EyeToHand];
 
-/// As the command line makes it.
+/// As made by the command line.
 fn examined(observations: &Observations) -> Option<(Calibration, Diagnosis)> {
     let cancel = CancelToken::default();
     let calibration = calibrate(observations, Method::Joint, &cancel).ok()?;
@@ -125,7 +125,7 @@ fn halves(sessions: u64, only: &str) {
 
 type Kind = (&'static str, fn(Scene) -> Scene);
 
-/// How the sessions are unlike the model, or poor.
+/// How the sessions differ from the model, or are weak.
 const KINDS: [Kind; 11] = [
     ("good", |scene| scene),
     ("little tilt", |scene| Scene { tilt_deg: 12.0, ..scene }),
@@ -150,7 +150,7 @@ const KINDS: [Kind; 11] = [
     ("board bent by 0.1 mm, little tilt", |scene| Scene { bend_m: 1e-4, tilt_deg: 12.0, ..scene }),
 ];
 
-/// What is stated of a lens and of a point where the target was seen.
+/// What is stated about a lens and about a point where the target was seen.
 #[derive(Default)]
 struct Held {
     lens: [usize; 4],
@@ -160,7 +160,7 @@ struct Held {
 }
 
 impl Held {
-    /// By a covariance of all unknowns that begins with the hand-eye transform.
+    /// With a covariance of all unknowns that begins with the hand-eye transform.
     fn add(&mut self, covariance: &DMatrix<f64>, lens_error_px: [f64; 4], joint: &JointFit, error_m: f64, focal: f64) {
         let sigma = |i: usize| covariance[(LENS_AT + i, LENS_AT + i)].sqrt();
         for (k, error) in lens_error_px.into_iter().enumerate() {

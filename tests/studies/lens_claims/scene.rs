@@ -1,4 +1,5 @@
-//! Sessions whose lens and links are drawn too, and whose robot errs in waves across its workspace, which no model of it follows.
+//! Sessions whose lens and links are drawn too, and whose robot has wave-like errors across its workspace, which no model of it
+//! fits.
 
 use handeye_estimate::diagnose::Calibration;
 use handeye_estimate::handeye::Mode;
@@ -18,7 +19,7 @@ const ROWS: usize = 7;
 const SQUARE_M: f64 = 0.015;
 const SIZE: (u32, u32) = (640, 480);
 
-/// What a session is drawn with.
+/// Parameters of a drawn session.
 #[derive(Debug, Clone, Copy)]
 pub struct Scene {
     pub mode: Mode,
@@ -34,15 +35,15 @@ pub struct Scene {
     pub waves_m: f64,
     /// Largest tilt of the board, degrees.
     pub tilt_deg: f64,
-    /// Largest turn of the camera about its axis, degrees.
+    /// Largest rotation of the camera about its axis, degrees.
     pub roll_deg: f64,
-    /// How far off the axis the board is at the most, as a part of its distance.
+    /// Largest distance of the board from the axis, as a fraction of its distance.
     pub beside: f64,
-    /// Deflection of the middle of the board, metres.
+    /// Deflection of the board's centre, metres.
     pub bend_m: f64,
-    /// What every point of the board is off its drawing within its plane, per axis, metres.
+    /// Print error of every point of the board within its plane, per axis, metres.
     pub print_m: f64,
-    /// fx over fy, less one, of images that were scaled in one direction.
+    /// fx over fy, minus one, for images that were scaled in one direction.
     pub aspect: f64,
 }
 
@@ -86,7 +87,7 @@ impl Scene {
         };
         let links = links(rng, self.mode);
         let waves = Waves::draw(rng, self.waves_m);
-        // With numbers of their own, so that they change nothing else.
+        // With random numbers of their own, so that nothing else changes.
         let mut of_print = ChaCha8Rng::seed_from_u64(seed ^ 0xb0a4d);
         let print = (0..COLUMNS * ROWS).map(|_| self.print_m * normal3(&mut of_print)).collect::<Vec<_>>();
         let mut views = Vec::new();
@@ -155,7 +156,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// With the lens given, its centre off by so many pixels.
+    /// With the lens given, its centre off by this many pixels.
     pub fn given(&self, centre_off: [f64; 2]) -> Observations {
         let [across, down] = centre_off;
         let given = Intrinsics { cx: self.lens.cx + across, cy: self.lens.cy + down, ..self.lens };
@@ -173,7 +174,7 @@ impl Session {
         Self::observed(None, CameraKnowledge::NOTHING, self.views.iter().map(without).collect())
     }
 
-    /// Both halves of a session whose lens is to be estimated: the views before the middle and those after it.
+    /// Both halves of a session whose lens has to be estimated: the views before the middle and those after it.
     pub fn halves(&self) -> [Observations; 2] {
         let (first, second) = self.views.split_at(self.views.len() / 2);
         [first, second].map(|views| Self::observed(Some(self.links.mode), CameraKnowledge::NOTHING, views.to_vec()))
@@ -184,7 +185,7 @@ impl Session {
         Observations { mode, target, image_size: SIZE, camera, views }
     }
 
-    /// Error of a point where the camera saw the target, metres, and the one that is stated.
+    /// Error of a point where the camera saw the target, metres, and the stated one.
     pub fn errors_m(&self, calibration: &Calibration) -> Option<(f64, Option<f64>)> {
         let point = calibration.joint.as_ref()?.reference_point;
         let answer = calibration.hand_eye.as_ref()?.mount_from_camera();
@@ -215,7 +216,7 @@ struct Waves {
 
 impl Waves {
     fn draw(rng: &mut ChaCha8Rng, amplitude_m: f64) -> Self {
-        // Half a turn to a turn and a half across half a metre.
+        // Half a turn to one and a half turns across half a metre.
         let directions = std::array::from_fn(|_| normal3(rng).normalize() * rng.random_range(6.0..18.0));
         Self { amplitude_m, directions, phases: std::array::from_fn(|_| rng.random_range(0.0..6.3)) }
     }

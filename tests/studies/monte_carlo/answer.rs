@@ -1,4 +1,4 @@
-//! What the project says to a trial: the one place where the study touches the estimator.
+//! The project's answers to a trial: the only place where the study uses the estimator.
 
 use handeye_estimate::handeye::PosePair;
 use handeye_estimate::handeye::closed_form::{self, ClosedFormSolution};
@@ -16,20 +16,20 @@ use nalgebra::{Matrix6, Point3};
 
 use super::scene::Trial;
 
-/// Noise levels of an exact robot, as an estimator that weighs by their inverse can be given them: a nanometre and a
+/// Noise levels of an exact robot, as given to an estimator that weights by their inverse: a nanometre and a
 /// nanoradian.
 const EXACT: f64 = 1e-9;
 /// Residual \[px\] at which a corner counts as simply wrong when the closed forms are ranked.
 const CAP_PX: f64 = 50.0;
 
-/// An estimate with everything that it says about itself.
+/// An estimate with everything that it reports about itself.
 pub struct Answer {
     pub mount_from_camera: Pose<Mount, Camera>,
     pub covariance: Matrix6<f64>,
     /// How the error is distributed in units of the covariance.
     pub small_sample: SmallSample,
     pub noise: Noise,
-    /// Views that were left out as outliers.
+    /// Views that were excluded as outliers.
     pub aside: usize,
     pub tip_error_95_m: f64,
     /// Where that error is stated, camera coordinates.
@@ -124,7 +124,7 @@ pub fn joint(trial: &Trial, start: &Start, noise_given: bool) -> Result<Answer, 
     })
 }
 
-/// The whole path of the product, from observed corners: what deals with views that are grossly wrong.
+/// The whole path of the product, from observed corners: includes the handling of grossly wrong views.
 pub fn product(trial: &Trial) -> Result<Answer, String> {
     let camera = if trial.cell.free_intrinsics {
         CameraKnowledge::Estimate { model: Distortion::BrownConrady([0.0; 5]), start: None }

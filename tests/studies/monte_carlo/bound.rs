@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix6, Point3, Vector3, Vector6};
 use super::scene::Trial;
 
 /// Step of the differences in metres, radians and lens coefficients: far above rounding (1e-13 of 500 px) and far below
-/// where the second-order term shows.
+/// where the second-order term matters.
 const STEP: f64 = 1e-6;
 /// Step of the differences in focal lengths and principal point, pixels; the projection is linear in them.
 const STEP_PX: f64 = 1e-2;
@@ -36,14 +36,14 @@ impl Rigid {
         self.rotation.transpose() * (p - self.translation)
     }
 
-    /// Moved and turned by `step` along and about axis `axis % 3` of its source frame.
+    /// Moved and rotated by `step` along and about axis `axis % 3` of its source frame.
     fn nudged(&self, axis: usize, step: f64) -> Self {
         let mut unit = Vector3::zeros();
         unit[axis % 3] = step;
         if axis < 3 {
             return Self { translation: self.translation + self.rotation * unit, ..*self };
         }
-        // Rodrigues: a turn by `step` about a unit axis.
+        // Rodrigues: a rotation by `step` about a unit axis.
         let cross = Matrix3::new(0.0, -unit.z, unit.y, unit.z, 0.0, -unit.x, -unit.y, unit.x, 0.0) / step;
         let turn = Matrix3::identity() + cross * step.sin() + cross * cross * (1.0 - step.cos());
         Self { rotation: self.rotation * turn, ..*self }
@@ -87,7 +87,7 @@ impl Model {
         [fx * u + cx, fy * v + cy]
     }
 
-    /// Derivatives of both coordinates of a pixel by every unknown.
+    /// Derivatives of both coordinates of a pixel with respect to every unknown.
     fn by_unknowns(nudged: &[(Self, Self, f64)], point: &Vector3<f64>) -> [[f64; UNKNOWNS]; 2] {
         let mut out = [[0.0; UNKNOWNS]; 2];
         for (k, (plus, minus, width)) in nudged.iter().enumerate() {
@@ -158,7 +158,7 @@ impl Normals {
 
 /// The smallest covariance that an unbiased estimate of the hand-eye transform can have, `[t; r]` as a right perturbation
 /// in metres and radians, from the views that are not grossly wrong. Target and robot errors are unknown too, and the
-/// lens where the cell says so. `None` when the views do not determine an answer.
+/// lens if the cell is configured so. `None` when the views do not determine an answer.
 pub fn hand_eye(normals: &Normals, noise: &Noise) -> Option<Matrix6<f64>> {
     let robot_exact = noise.robot_m == 0.0 && noise.robot_rad == 0.0;
     let weight = noise.corner_px.powi(-2);
@@ -206,7 +206,7 @@ pub fn levels(bound: &Matrix6<f64>) -> (f64, f64) {
     (of(0..3), of(3..6))
 }
 
-/// What the tangent vector of an error is, in the convention of the bound.
+/// The tangent vector of an error, in the convention of the bound.
 pub fn error_twist(truth: &Isometry3<f64>, estimate: &Isometry3<f64>) -> Vector6<f64> {
     let d = truth.inverse() * estimate;
     let r = d.rotation.scaled_axis();

@@ -1,7 +1,7 @@
-//! How well noise levels can be told at all: the least scatter of an estimate of them.
+//! How accurately noise levels can be estimated at all: the least scatter of an estimate of them.
 //!
-//! Like the bound it is computed from the model and not by the estimator: the inverse of the expected information of the
-//! restricted likelihood, `½ tr(P V_k P V_l)`.
+//! Like the bound it is computed from the model and not with the estimator: the inverse of the expected information of
+//! the restricted likelihood, `½ tr(P V_k P V_l)`.
 
 use handeye_estimate::handeye::joint::Noise;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector6};
@@ -13,7 +13,7 @@ fn symmetric(m: &DMatrix<f64>) -> DMatrix<f64> {
     (m + m.transpose()) * 0.5
 }
 
-/// Relative standard deviations that estimates of the levels of corners, robot position and robot orientation have at the
+/// Relative standard deviations that estimates of the levels of corners, robot position and robot orientation have at
 /// least; infinite for one that is zero, `None` when the views determine neither answer nor noise levels.
 pub fn level_scatter(normals: &Normals, noise: &Noise) -> Option<[f64; 3]> {
     let p = normals.shared;

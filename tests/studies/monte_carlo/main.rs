@@ -34,7 +34,8 @@ use rayon::prelude::*;
 use scene::Cell;
 use tally::Summary;
 
-/// The robots of the grid: noise per axis in metres and degrees, then errors that depend on the place likewise.
+/// The robots of the grid: noise per axis in metres and degrees, then errors that depend on the place, in the same
+/// units.
 const ROBOTS: [[f64; 4]; 4] = [[0.0; 4], [1e-4, 0.02, 0.0, 0.0], [5e-4, 0.1, 0.0, 0.0], [1e-4, 0.02, 2e-3, 0.2]];
 
 struct Arguments {
@@ -108,7 +109,7 @@ fn arguments(mut words: impl Iterator<Item = String>) -> Result<Arguments, Strin
     Ok(Arguments { cells, trials, threads, seed, product })
 }
 
-/// A seed that differs between cells, so that their results are independent of each other (FNV-1a of what they are).
+/// A seed that differs between cells, so that their results are independent of each other (FNV-1a of their parameters).
 fn cell_seed(cell: &Cell, seed: u64) -> u64 {
     let text = format!("{seed} {cell:?}");
     text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))

@@ -16,9 +16,10 @@ use rand_chacha::ChaCha8Rng;
 
 /// Opening angle of the reference cell's camera, degrees.
 const VIEW_ANGLE_DEG: f64 = 57.0;
-/// A mild barrel lens, so that no derivative by a coefficient is taken at zero distortion.
+/// A mild barrel lens, so that no derivative with respect to a coefficient is taken at zero distortion.
 const DISTORTION: Distortion = Distortion::BrownConrady([-0.08, 0.05, 0.0006, -0.0004, -0.01]);
-/// How far \[px\] the true corners stay from the edge of the image: seven times the largest corner noise of the study.
+/// Minimum distance \[px\] of the true corners from the edge of the image: seven times the largest corner noise of the
+/// study.
 const MARGIN_PX: f64 = 2.0;
 
 /// What is the same in all trials of a cell of the table.
@@ -50,8 +51,8 @@ pub fn intrinsics() -> Intrinsics {
     Intrinsics { distortion: DISTORTION, ..Intrinsics::from_view_angle(640, 480, VIEW_ANGLE_DEG.to_radians()) }
 }
 
-/// Hand-eye and place of the target: in the hand, the camera of the reference cell, 50 mm beside the tip and turned by a
-/// quarter, before its upright board; to the hand, a camera on a stand beside the arm, which holds the board.
+/// Hand-eye and place of the target: in the hand, the camera of the reference cell, 50 mm next to the tip and rotated by
+/// 90°, in front of its upright board; to the hand, a camera on a stand next to the arm, which holds the board.
 fn truth(mode: Mode) -> Links {
     let quarter = std::f64::consts::FRAC_PI_2;
     let (camera, target) = match mode {
@@ -79,7 +80,7 @@ fn true_pixels(
     points.iter().map(|p| pixel(intrinsics, &(camera_from_target.isometry() * p)).filter(inside)).collect()
 }
 
-/// Draws a trial. Trials of one seed and different numbers are independent; the same pair gives the same trial.
+/// Draws a trial. Trials with one seed and different numbers are independent; the same pair gives the same trial.
 pub fn trial(cell: &Cell, seed: u64, number: u64) -> Trial {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(number);
@@ -111,7 +112,7 @@ pub fn trial(cell: &Cell, seed: u64, number: u64) -> Trial {
 }
 
 impl Trial {
-    /// Spoils a tenth of the views, at least one, by the three faults in turn.
+    /// Corrupts a tenth of the views, at least one, with the three faults in turn.
     fn corrupt(&mut self, number: u64, rng: &mut impl Rng) {
         let mut order: Vec<usize> = (0..self.views.len()).collect();
         order.shuffle(rng);

@@ -46,7 +46,7 @@ fn joined(parts: impl Iterator<Item = String>) -> String {
     parts.collect::<Vec<_>>().concat()
 }
 
-/// Errors of the joint estimate and of every closed form against the bound.
+/// Errors of the joint estimate and of every closed form relative to the bound.
 pub fn errors(summaries: &[Summary]) -> String {
     let names = summaries.first().map(|s| s.closed_forms.iter().map(|c| c.0).collect::<Vec<_>>()).unwrap_or_default();
     let mut out = format!(
@@ -97,7 +97,7 @@ pub fn coverage(summaries: &[Summary]) -> String {
     out
 }
 
-/// Estimated over true noise levels: root mean square, and their scatter beside the least possible.
+/// Estimated over true noise levels: root mean square, and their scatter next to the smallest possible.
 pub fn levels(summaries: &[Summary]) -> String {
     let mut out = format!(
         "{LEAD} corner noise | scatter (least) | robot, translation | scatter (least) | robot, rotation | scatter (least) |\n{LEAD_RULE}{}\n",
@@ -146,7 +146,7 @@ pub fn pooled(summaries: &[Summary]) -> String {
     out
 }
 
-/// What did not work, one line a cell.
+/// Failures, one line per cell.
 pub fn failures(summaries: &[Summary]) -> String {
     let mut out = String::new();
     for s in summaries {

@@ -14,10 +14,10 @@ const COMPONENTS: f64 = 6.0;
 const PROBABILITY: f64 = 0.95;
 /// Degrees of freedom that count as infinite: quantiles differ by less than one part in a thousand.
 const MANY: f64 = 1e4;
-/// Times the bound beyond which an estimate is not a matter of noise.
+/// Multiple of the bound beyond which an error cannot be due to noise.
 const FAR: f64 = 8.0;
 
-/// How far an answer is from the truth, and what it says of that.
+/// How far an answer is from the truth, and the error it states.
 #[derive(Debug, Clone, Copy)]
 pub struct Deviation {
     /// Squared translation error, m².
@@ -33,20 +33,20 @@ impl Deviation {
     }
 }
 
-/// One estimate judged against the truth.
+/// One estimate compared with the truth.
 #[derive(Debug, Clone, Copy)]
 pub struct Judged {
     pub deviation: Deviation,
-    /// Squared length of the error measured by the stated covariance; 6 on average when that is true.
+    /// Squared length of the error weighted by the stated covariance; 6 on average if that is correct.
     pub mahalanobis2: f64,
-    /// Whether the stated 95 % region holds the truth.
+    /// Whether the stated 95 % region contains the truth.
     pub covered: bool,
     /// Whether the stated tip error is not exceeded.
     pub tip_covered: bool,
-    /// Outlier views, less those that are wrong.
+    /// Outlier views, minus those that are wrong.
     pub aside: f64,
     /// Estimated over true noise levels: corner, robot in translation and in rotation; the levels themselves in µm and
-    /// millidegrees where the robot is exact.
+    /// millidegrees if the robot is exact.
     pub noise: [f64; 3],
 }
 
@@ -81,7 +81,7 @@ impl Judged {
     }
 }
 
-/// The squared Mahalanobis distance that 95 % of errors stay under: six times the F quantile, or chi-square's where the
+/// The squared Mahalanobis distance that 95 % of errors stay under: six times the F quantile, or chi-square's if the
 /// covariance counts as known.
 fn limit(degrees_of_freedom: f64) -> Option<f64> {
     if degrees_of_freedom < MANY {
@@ -90,18 +90,18 @@ fn limit(degrees_of_freedom: f64) -> Option<f64> {
     Some(ChiSquared::new(COMPONENTS).ok()?.inverse_cdf(PROBABILITY))
 }
 
-/// Everything about one trial. An estimate that failed is an error with its words.
+/// Everything about one trial. An estimate that failed is an error with its message.
 pub struct Outcome {
     pub bound: Matrix6<f64>,
     pub given: Result<Judged, String>,
     pub estimated: Result<Judged, String>,
     pub closed_forms: Vec<Option<Deviation>>,
-    /// Relative standard deviations that estimates of the noise levels must have at the least.
+    /// Minimum relative standard deviations of estimates of the noise levels.
     pub level_scatter: Option<[f64; 3]>,
 }
 
-/// Draws a trial, solves it and judges the answers. `product` asks for the whole path of `calibrate` in place of the
-/// estimator alone, where noise levels are estimated.
+/// Draws a trial, solves it and judges the answers. `product` selects the whole path of `calibrate` instead of the
+/// estimator alone, if noise levels are estimated.
 pub fn run(cell: &Cell, seed: u64, number: u64, product: bool) -> Result<Outcome, String> {
     let trial = super::scene::trial(cell, seed, number);
     let normals = Normals::new(&trial);
@@ -148,7 +148,7 @@ pub struct Performance {
     pub covered: f64,
     pub tip_covered: f64,
     pub mean_mahalanobis2: f64,
-    /// Mean number of views left out as an outlier, less those that are wrong.
+    /// Mean number of views excluded as outliers, minus those that are wrong.
     pub aside: f64,
     /// Root mean squares of [`Judged::noise`], and its standard deviations.
     pub noise: [f64; 3],
@@ -202,7 +202,7 @@ pub struct Summary {
     pub estimated: Performance,
     /// Name, translation and rotation ratio, and number of failures of every closed form.
     pub closed_forms: Vec<(&'static str, Ratio, Ratio, usize)>,
-    /// Trials whose estimate with estimated noise levels is more than [`FAR`] times its bound away, and how many times.
+    /// Trials whose estimate with estimated noise levels is more than [`FAR`] times its bound away, with the multiple.
     pub far: Vec<(usize, f64)>,
     /// Mean of [`Outcome::level_scatter`].
     pub level_scatter: [f64; 3],

@@ -1,12 +1,12 @@
-//! Folds of views that are neighbours in space.
+//! Folds of neighbouring views.
 
 use handeye_estimate::handeye::Mode;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::sets::Set;
 
-/// Fold of every view: the tip positions are cut across their direction of largest variance into two parts of whole folds,
-/// and the parts again, until each is one fold. Sizes differ by at most one view. Views at the same place stay in their order.
+/// Fold of every view: the tip positions are cut across their direction of largest variance into two parts of whole folds, and
+/// the parts again, until each is one fold. Sizes differ by at most one view. Views at the same place keep their order.
 pub fn folds(set: &Set, count: usize) -> Vec<usize> {
     let tips: Vec<Vector3<f64>> = set
         .pairs

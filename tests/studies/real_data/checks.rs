@@ -1,4 +1,4 @@
-//! What the checks of the stated uncertainty say of every set.
+//! The results of the checks of the stated uncertainty for every set.
 
 use handeye_estimate::handeye::joint::{Free, ShownEffects};
 use handeye_estimate::uncertainty::{overdispersion, quality};

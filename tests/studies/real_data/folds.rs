@@ -1,4 +1,4 @@
-//! Held-out error of every method over five folds, of scattered views and of neighbours.
+//! Held-out error of every method over five folds, with scattered views and with neighbours.
 
 use handeye_estimate::uncertainty::quality;
 use rand::SeedableRng as _;
@@ -19,7 +19,7 @@ struct Errors {
     name: &'static str,
     /// `i mod 5` first, then the random divisions.
     scattered: Vec<ByView>,
-    /// Folds of neighbours, where the method has an answer without each of them.
+    /// Folds of neighbours, if the method has an answer without each of them.
     blocked: Option<ByView>,
 }
 
@@ -108,7 +108,7 @@ pub fn run(set: &Set, random: usize) {
     }
 }
 
-/// Where a method is better than another by more than two standard errors, in words.
+/// In which columns a method is better than another by more than two standard errors, in words.
 fn where_better(set: &Set, method: &Errors, reference: &Errors) -> Option<String> {
     let scattered = method.against(reference);
     let blocked = method.blocked_against(reference).unwrap_or_default();
@@ -171,7 +171,7 @@ fn squared_px(set: &Set, answer: &Answer, view: usize) -> Option<f64> {
     squared.map(|s| s / corners.len() as f64)
 }
 
-/// With the target's pose from the corners of the view alone, by the camera and the target of the answer.
+/// With the target's pose from the corners of the view alone, with the camera and the target of the answer.
 fn board_error_m(set: &Set, answer: &Answer, view: usize) -> Option<f64> {
     let pair = &set.pairs[view];
     let mut camera_from_target = pair.camera_from_target;

@@ -1,4 +1,4 @@
-//! Whether the answers of random halves agree as well as they say, each calibrated and examined as the command line does it.
+//! Whether the answers of random halves agree as well as they state, each calibrated and examined as in the command line.
 
 use handeye_estimate::diagnose::{Calibration, calibrate};
 use handeye_estimate::{CameraKnowledge, Method, Observations, ObservedView};
@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::methods::MANY;
 use crate::sets::Set;
 
-/// Standard deviations within which two answers that differ by chance alone are in 95 %.
+/// Number of standard deviations within which two answers that differ by chance alone are in 95 % of cases.
 const WITHIN: f64 = 1.96;
 /// Numbers of a lens that are compared: fx, fy, cx, cy.
 const LENS_NUMBERS: usize = 4;
@@ -39,15 +39,15 @@ impl Share {
     }
 }
 
-/// What pairs of halves showed.
+/// The results of pairs of halves.
 #[derive(Default)]
 pub struct Agreement {
     translation: Share,
     rotation: Share,
     lens: Share,
-    /// Errors of a measured point against the root of the sum of the squares of what both state.
+    /// Errors of a measured point compared with the root of the sum of the squares of both stated errors.
     point: Share,
-    /// Halves for which nothing was stated, of all.
+    /// Share of halves for which nothing was stated.
     silent: Share,
     apart_m: Vec<f64>,
 }
@@ -61,7 +61,7 @@ impl Agreement {
         let Some((difference, at)) = difference(a, b) else { return };
         let moved_m = (difference.fixed_rows::<3>(0) + difference.fixed_rows::<3>(3).cross(&at.coords)).norm();
         self.apart_m.push(moved_m);
-        // Where the data contradict themselves nothing is said that could be wrong.
+        // If the data contradict themselves nothing is stated that could be wrong.
         let (Some(of_a), Some(of_b)) = (a.tip_error_95_m(), b.error_95_m(&at)) else { return };
         self.point.add(moved_m <= of_a.hypot(of_b));
         if let (Some(ca), Some(cb)) = (a.link_covariances(), b.link_covariances()) {
@@ -112,7 +112,7 @@ fn difference(a: &Calibration, b: &Calibration) -> Option<(Vector6<f64>, nalgebr
 
 /// A number of the lens that was estimated, and its standard deviation.
 fn lens(calibration: &Calibration, k: usize) -> Option<(f64, f64)> {
-    /// Where the lens begins among the unknowns that the covariance is of.
+    /// Index of the lens among the unknowns of the covariance.
     const LENS_AT: usize = 12;
     let joint = calibration.joint.as_ref().filter(|joint| joint.free.intrinsics)?;
     Some((calibration.intrinsics()?.parameters()[k], joint.covariance[(LENS_AT + k, LENS_AT + k)].sqrt()))
@@ -126,7 +126,7 @@ pub fn header() {
     println!("|---|---|---|---|---|---|---|---|");
 }
 
-/// Random divisions of a set, and what those with the lens as given and those with an estimated one show together.
+/// Random divisions of a set; the combined result with the lens as given and with an estimated one.
 pub fn run(set: &Set, splits: usize) -> Agreement {
     let mut of_all = Agreement::default();
     for (camera, given) in [("given", true), ("estimated", false)] {

@@ -1,5 +1,5 @@
-//! What the estimator is worth on recorded data: held-out error of every method over five folds, agreement of the
-//! answers of random halves, and the checks of the stated uncertainty.
+//! How good the estimator is on recorded data: held-out error of every method over five folds, agreement of the answers
+//! of random halves, and the checks of the stated uncertainty.
 //!
 //! ```text
 //! cargo run --release -p handeye_studies --example real_data -- folds 20
@@ -7,8 +7,8 @@
 //! cargo run --release -p handeye_studies --example real_data -- checks
 //! ```
 //!
-//! The number is that of random divisions; names of sets may follow. The data sets are looked for in `$HANDEYE_DATA`, then
-//! in `../shared/data`. What came out is in `docs/studies/real_data.md`.
+//! The number is that of random divisions; names of sets may follow. The data sets are searched for in `$HANDEYE_DATA`,
+//! then in `../shared/data`. The results are in `docs/studies/real_data.md`.
 
 mod blocks;
 mod checks;

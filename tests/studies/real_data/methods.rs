@@ -14,18 +14,18 @@ use handeye_geometry::targets::observation::View;
 
 use crate::sets::Set;
 
-/// What a method found.
+/// The result of a method.
 pub struct Answer {
     pub mount_from_camera: Pose<Mount, Camera>,
     pub anchor_from_target: Pose<Anchor, Target>,
     pub intrinsics: Intrinsics,
     pub shape: BoardShape,
-    /// To be taken out of reported poses, where the method finds it and the row says that it is applied.
+    /// To be removed from reported poses, if the method finds it and the row applies it.
     pub field: Option<PoseDependentError>,
 }
 
 impl Answer {
-    /// By the reported robot pose of a view.
+    /// From the reported robot pose of a view.
     pub fn anchor_from_mount(&self, set: &Set, view: usize) -> Pose<Anchor, Mount> {
         match &self.field {
             Some(field) => set.mode.anchor_from_mount(&field.applied(&set.views[view].base_from_tip)),
@@ -34,10 +34,10 @@ impl Answer {
     }
 }
 
-/// Name of our estimator in tables: outlier views left out, camera as given, target flat and of the stated size.
+/// Name of our estimator in tables: outlier views excluded, camera as given, target flat and of the stated size.
 pub const OURS: &str = "joint";
 
-/// With the robot's field where the data show one: by the links alone, and with the field applied to the reported pose.
+/// With the robot's field if the data show one: with the links alone, and with the field applied to the reported pose.
 pub const FIELD: &str = "joint, field in the model";
 const APPLIED: &str = "joint, field applied";
 
@@ -54,7 +54,7 @@ const FIXED: Free = Free { intrinsics: false, warp: false, scale: false, arm: fa
 /// Fewest views from which camera and warp are freed.
 pub const MANY: usize = 12;
 
-/// What may be freed for a set: the scale always, the camera where there are views enough.
+/// What may be freed for a set: the scale always, the camera if there are enough views.
 pub fn variants(set: &Set) -> impl Iterator<Item = (&'static str, Free)> {
     let many = set.views.len() >= MANY;
     VARIANTS.into_iter().filter(move |(_, free)| many || !(free.intrinsics || free.warp))
@@ -100,8 +100,8 @@ impl Choice {
         Self { views, pairs }
     }
 
-    /// The joint estimate from the first closed form that has an answer, outlier views left out; with the robot's field, if
-    /// that is free, where these views show one.
+    /// The joint estimate from the first closed form that has an answer, outlier views excluded; with the robot's field, if
+    /// that is free and these views show one.
     pub fn joint(&self, set: &Set, free: Free) -> Option<Kept> {
         let problem = JointProblem {
             free: Free { field: false, ..free },
@@ -144,7 +144,7 @@ impl Choice {
         })
     }
 
-    /// The answer of a method, where it has one.
+    /// The answer of a method, if it has one.
     pub fn solve(&self, set: &Set, name: &str) -> Option<Answer> {
         let of = |s: ClosedFormSolution| Answer {
             mount_from_camera: s.mount_from_camera,

@@ -1,4 +1,4 @@
-//! The recorded sets: poses, corners and target poses as their `views.json` and corner tables have them.
+//! The recorded sets: poses, corners and target poses from their `views.json` and corner tables.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,7 +17,7 @@ pub struct Set {
     pub name: String,
     pub mode: Mode,
     pub target: TargetSpec,
-    /// Width and height.
+    /// Empty corners if the set has pose pairs only.
     pub image_size: (u32, u32),
     pub board: BoardPoints,
     /// Empty corners where the set has pose pairs only.
@@ -109,7 +109,7 @@ fn load(data: &Path, name: &str) -> Set {
     Set { name: name.to_owned(), mode, target, image_size, board, views, pairs, intrinsics, centre }
 }
 
-/// What the corners of a set are those of.
+/// The target that the corners of a set belong to.
 fn target(board: &Value) -> TargetSpec {
     let count = |name: &str| board[name].as_u64().expect("the board has a size") as usize;
     let length = |name: &str| board[name].as_f64().expect("the board has lengths");
@@ -143,7 +143,7 @@ fn pose_pairs(folder: &Path, name: &str) -> Set {
         .collect();
     let intrinsics = Intrinsics::pinhole(1, 1, 1.0);
     let (board, views, centre) = (BoardPoints::new(&[]), Vec::new(), Point3::origin());
-    // The distances between its points are nowhere asked for.
+    // The distances between its points are never used.
     let target = TargetSpec::Chessboard(Grid { columns: 0, rows: 0, square_m: 1.0 });
     Set { name: name.to_owned(), mode, target, image_size: (1, 1), board, views, pairs, intrinsics, centre }
 }

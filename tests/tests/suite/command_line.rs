@@ -162,7 +162,7 @@ fn the_doctor_answers_for_a_healthy_session_and_for_one_without_an_answer() {
         assert!(text(&report.stdout).contains(reported), "{reported:?} is not in the report");
     }
 
-    // That there is no calibration is what the diagnosis is about.
+    // A missing calibration is the subject of the diagnosis.
     let folder = tempfile::tempdir().expect("a folder");
     dataset(folder.path(), "image,x,y,z,rx,ry,rz\na.png,0,0,0,0,0,0\n");
     let ill = handeye(&["doctor", utf8(folder.path())]);
@@ -175,9 +175,9 @@ fn a_track_has_a_pose_for_every_image_and_needs_a_hand_eye_transform() {
     let (_home, session) = copy_of_session();
     let result = session.join("result.json");
     let file = session.join("track.json");
-    // By the session and by its result: the board is known from both.
+    // From the session and from its result: the board is known from both.
     for calibration in [&session, &result] {
-        // A board that moves may leave the view between two images of a busy machine.
+        // A board that moves may leave the view between two images on a busy machine.
         let run = ["track", "-q", "--calibration", utf8(calibration), "--frames", "5", "--board-path", "still"];
         let output = handeye(&[&run[..], &["--json", utf8(&file)]].concat());
         assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
@@ -218,7 +218,7 @@ fn a_folder_without_a_description_is_answered_with_one_to_fill_in() {
         for line in ["poses = \"poses.csv\"", "#? rotation = \"rpy\"", "#? rotation = \"rotation_vector\""] {
             assert!(template.lines().any(|found| found.starts_with(line)), "{line} is not in\n{template}");
         }
-        // Saved as it is, it is refused: nothing in it was guessed. A shell makes the file before the command runs.
+        // Saved unchanged, it is refused: nothing in it was guessed. A shell creates the file before the command runs.
         let file = std::fs::File::create(folder.path().join("dataset.toml")).expect("created");
         let saving =
             crate::solved::command().args([command, utf8(folder.path())]).stdout(file).output().expect("it runs");
@@ -266,9 +266,9 @@ fn poses_are_planned_for_a_recorded_session_from_which_the_whole_board_is_seen()
         before_mm = error_mm;
         let camera_from_target = (isometry(&pose["base_from_tip"]) * tip_from_camera).inverse() * base_from_target;
         let reported = isometry(&pose["camera_from_target"]);
-        // But for what the errors of this arm, which is nearly exact, put it off.
+        // Except for the error of this arm, which is nearly exact.
         assert!((camera_from_target.translation.vector - reported.translation.vector).norm() < 1e-3, "{pose}");
-        // The outermost of the 10×7 corners; the lens of this cell bends nothing.
+        // The outermost of the 10×7 corners; the lens of this cell has no distortion.
         for corner in [[0.0, 0.0], [0.135, 0.0], [0.0, 0.09], [0.135, 0.09]] {
             let at = camera_from_target * Point3::new(corner[0], corner[1], 0.0);
             let px = [of_camera("fx") * at.x / at.z + of_camera("cx"), of_camera("fy") * at.y / at.z + of_camera("cy")];

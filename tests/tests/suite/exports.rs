@@ -1,4 +1,4 @@
-//! Every export, read by the programs that it is for.
+//! Every export, read by the programs that it is meant for.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ const GOLDEN_XYZW: [f64; 4] = [0.195832126, 0.036412615, 0.644503346, 0.73820006
 
 fn result_of(links: &HandEye, distortion: Distortion) -> CalibrationResult {
     let (chain, fit) = golden_arm();
-    // A standing camera's robot is on a table, with a tool.
+    // The robot of a fixed camera is on a table, with a tool.
     let on_a_table = chain.clone().mounted(gimbal_lock(1.0, 0.3), golden());
     let chain = if matches!(links, HandEye::EyeInHand { .. }) { chain } else { on_a_table };
     let mut result =
@@ -45,7 +45,7 @@ fn golden() -> Isometry3<f64> {
     *Pose::<Tip, Base>::from_translation_xyzw(GOLDEN_M, GOLDEN_XYZW).isometry()
 }
 
-/// A rotation about y by ±90°, where roll and yaw turn about one axis, after a turn about x.
+/// A rotation about y by ±90°, where roll and yaw rotate about one axis, after a rotation about x.
 fn gimbal_lock(sign: f64, off_rad: f64) -> Isometry3<f64> {
     let pitch = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), sign * (std::f64::consts::FRAC_PI_2 - off_rad));
     let turn = |axis, angle| UnitQuaternion::from_axis_angle(&axis, angle);
@@ -63,7 +63,7 @@ fn views() -> Vec<ExportView> {
     (1..=4).map(view).collect()
 }
 
-/// Writes every format that can hold a calibration, with what the readers need to know. Gives the formats.
+/// Writes every format that can hold a calibration, with what the readers need. Returns the formats.
 fn write_case(folder: &Path, result: &CalibrationResult, names: &ExportNames) -> Vec<&'static str> {
     let views = views();
     let input = ExportInput { result, names, views: &views };
@@ -195,7 +195,7 @@ fn the_command_line_exports_poses_of_images_from_a_dataset_folder() {
     let images = std::fs::read_to_string(out.join("images.txt")).expect("images");
     assert_eq!(images.matches(".png").count(), views().len(), "{images}");
 
-    // The same from the result file in that folder; alone the file has no poses.
+    // The same from the result file in that folder; on its own the file has no poses.
     let output = handeye_export(&dataset.join("result.json"), &out, &["--format", "colmap"]);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     let alone = folder.path().join("alone.json");

@@ -1,4 +1,4 @@
-//! Clients that mean the cell no good, against `handeye cell` as a process.
+//! Malicious clients, against `handeye cell` as a process.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
@@ -25,7 +25,7 @@ fn dial(port: u16) -> TcpStream {
     stream
 }
 
-/// Puts the first joint to a radian.
+/// Moves the first joint to one radian.
 fn move_the_arm(arm: &mut Arm) -> Vec<u8> {
     let joint = arm.sim().get_object_index("/UR5/joint", 0).expect("a joint");
     hostile::request("page", "sim.setJointPosition", vec![Value::from(joint.0), Value::Float(1.0)])
@@ -47,7 +47,7 @@ fn nothing_but_a_zeromq_socket_of_version_3_commands_the_cell() {
     let (mut arm, _camera) = connect(&cell);
     let request = move_the_arm(&mut arm);
     let before = arm.joint_values().expect("a call");
-    // A socket of the library takes all of them for requests.
+    // A socket of the library accepts all of them as requests.
     let router = zmq::Context::new().socket(zmq::ROUTER).expect("a socket");
     router.set_rcvtimeo(PATIENCE.as_millis() as i32).expect("an option");
     router.bind("tcp://127.0.0.1:*").expect("a port");
@@ -59,7 +59,7 @@ fn nothing_but_a_zeromq_socket_of_version_3_commands_the_cell() {
         while router.recv_multipart(0).expect(what).pop().expect("a frame") != request {}
 
         let mut refused = dial(cell.port());
-        // The cell may have closed the connection over the first byte.
+        // The cell may have closed the connection at the first byte.
         let _sent = refused.write_all(&bytes).is_ok();
         let mut answer = Vec::new();
         let _reset = refused.read_to_end(&mut answer).is_err();
@@ -93,7 +93,7 @@ fn sockets(pid: u32) -> usize {
 #[cfg(target_os = "linux")]
 fn a_hundred_clients_that_never_read_share_64_mib_and_leave_nothing_behind() {
     const CLIENTS: usize = 100;
-    // What the cell needs beside replies that wait: those that are being made, and what an allocator keeps.
+    // Memory of the cell in addition to waiting replies: replies in preparation, and what an allocator keeps.
     const BESIDE: u64 = 24 << 20;
     let cell = CellProcess::start(&[]);
     let (mut arm, mut camera) = connect(&cell);
@@ -105,13 +105,13 @@ fn a_hundred_clients_that_never_read_share_64_mib_and_leave_nothing_behind() {
         .map(|_| {
             let mut stream = dial(cell.port());
             hostile::introduce(&mut stream);
-            // More than the system itself keeps on the way.
+            // More than the system itself buffers.
             stream.write_all(&hostile::framed(&request).repeat(20)).expect("sent");
             stream
         })
         .collect();
     let began = Instant::now();
-    // By then all requests are in, and some connections are closed.
+    // By then all requests have arrived, and some connections are closed.
     for _ in 0..100 {
         camera.grab().expect("whoever reads is served");
         assert!(memory(cell.id(), "VmRSS:") < before + (64 << 20) + BESIDE, "{}", memory(cell.id(), "VmRSS:"));
@@ -131,7 +131,7 @@ fn a_hundred_clients_that_never_read_share_64_mib_and_leave_nothing_behind() {
         camera.grab().expect("a frame");
         assert!(began.elapsed() < PATIENCE, "{} connections stay", sockets(cell.id()) - others);
     }
-    // And their memory goes back to the system.
+    // And their memory is returned to the system.
     while memory(cell.id(), "VmRSS:") >= before + BESIDE {
         camera.grab().expect("a frame");
         let kept = memory(cell.id(), "VmRSS:");
@@ -152,7 +152,7 @@ fn signal(pid: u32, name: &str) {
 fn unfinished_requests_that_come_all_in_one_turn_share_64_mib_too() {
     const CLIENTS: usize = 200;
     const REQUEST: usize = 1 << 20;
-    // What the allocator keeps while one connection is let go for the next. Without a bound it is 200 MiB and more.
+    // What the allocator keeps when one connection is closed for the next. Without a bound it is 200 MiB and more.
     const BESIDE: u64 = 40 << 20;
     let cell = CellProcess::start(&[]);
     let (mut arm, _camera) = connect(&cell);
@@ -161,7 +161,7 @@ fn unfinished_requests_that_come_all_in_one_turn_share_64_mib_too() {
     clients.iter_mut().for_each(hostile::introduce);
     let head = [&[1, 0, 2][..], &(REQUEST as u64).to_be_bytes()].concat();
     let unfinished = [head, vec![0; REQUEST - 1]].concat();
-    // A cell that stands still finds all of them when it goes on.
+    // A cell that is stopped finds all of them when it resumes.
     signal(cell.id(), "STOP");
     for client in &mut clients {
         client.set_write_timeout(Some(PATIENCE)).expect("an option");

@@ -1,4 +1,4 @@
-//! `handeye import` on recordings in other people's formats, compared with an independent reader in Python.
+//! `handeye import` on recordings in other tools' formats, compared with an independent reader in Python.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -17,9 +17,9 @@ use tempfile::TempDir;
 
 use crate::solved::{command, text};
 
-/// A recording, and what is known of it.
+/// A recording, and what is known about it.
 struct Sample {
-    /// How the reader in Python calls it.
+    /// Its name in the reader in Python.
     kind: &'static str,
     /// Files of the reference data; a folder is taken whole.
     files: &'static [&'static str],
@@ -86,7 +86,7 @@ const SAMPLES: [Sample; 8] = [
         first: &[("mode", "eye_in_hand"), ("pose", "base_from_tip"), ("rotation", "rotation_vector")],
         views: 8,
     },
-    // Its tag is described without a number, which the images have.
+    // The description of its tag has no number, but the images have one.
     Sample {
         kind: "visp",
         files: &["visp_franka_eye_to_hand"],
@@ -143,13 +143,13 @@ fn matrix(value: &Value) -> Matrix4<f64> {
 
 /// Seconds that reading may take on a busy machine.
 const PATIENCE: &str = "600";
-/// Hypotheses that the list shows; what is left out is counted.
+/// Hypotheses that the list shows; the others are counted.
 const SHOWN: usize = 12;
 
 #[test]
 fn the_list_of_hypotheses_counts_what_it_leaves_out_and_says_nothing_of_more_where_it_shows_all() {
     let Some(data) = data_folder() else { return };
-    // Of which the place of the camera is known: where it is all that is open, the two are asked for and the rest is not listed.
+    // If the place of the camera is all that is open, both are offered and the rest is not listed.
     let many = (&["importers/table_eye_in_hand"][..], &["--target", "11x8x20", "--set", "mode=eye_in_hand"][..]);
     let few = (&["moveit_pose_samples/pose_samples.json"][..], &[][..]);
     let counts = [many, few].map(|(files, arguments)| {
@@ -267,7 +267,7 @@ fn squares_counted_for_corners_and_a_target_not_named_are_said_with_what_is_seen
     }
 }
 
-/// A bag of a writer that is not ours, of a robot that goes from view to view, in every kind of file that it writes.
+/// A bag from a third-party writer, of a robot that moves from view to view, in every file format of that writer.
 #[test]
 fn a_bag_gives_the_images_where_the_robot_rested_with_its_poses_there() {
     let Some(data) = data_folder() else { return };
@@ -349,7 +349,7 @@ fn a_recording_becomes_a_session_in_the_window_once_a_person_has_said_what_the_f
     assert!(bench.model().import.is_none(), "nothing is left open");
 }
 
-/// A person with a camera and a board, and no robot: what the command line finds of the camera, the window finds.
+/// A user with a camera and a board, but no robot: the window finds the same camera as the command line.
 #[test]
 fn images_alone_become_a_session_that_calibrates_the_camera_as_the_command_line_does() {
     let home = TempDir::new().expect("a folder");
@@ -390,15 +390,15 @@ fn images_alone_become_a_session_that_calibrates_the_camera_as_the_command_line_
         let result: Value = serde_json::from_slice(&run.stdout).expect("JSON");
         for (key, value) in [("fx", in_window.fx), ("fy", in_window.fy), ("cx", in_window.cx), ("cy", in_window.cy)] {
             let off_px = result["intrinsics"][key].as_f64().expect("a number") - value;
-            // Recorded images are kept as they are, so the numbers are the same but for their order.
+            // Recorded images are kept as they are, so the numbers are the same except for their order.
             assert!(off_px.abs() < 1e-6, "{key} of {what} is {off_px} px off");
         }
         assert_eq!(result["hand_eye"], Value::Null, "{what}");
     }
 }
 
-/// The images of a robot that never rests, by a camera whose clock is behind by 44 ms: every view has to get the pose that
-/// the robot had when it was taken, and the calibration what the camera really is at.
+/// The images of a robot that never rests, from a camera whose clock is behind by 44 ms: every view has to get the pose of
+/// the robot when it was taken, and the calibration the true pose of the camera.
 #[test]
 fn a_bag_of_a_moving_robot_gives_poses_by_the_clocks_of_both_and_a_calibration() {
     let Some(python) = python() else { return };
@@ -431,7 +431,7 @@ fn a_bag_of_a_moving_robot_gives_poses_by_the_clocks_of_both_and_a_calibration()
         let name = entry.image_path.as_ref().expect("an image").to_string_lossy().into_owned();
         let (_, true_pose) = poses.iter().find(|(stamp, _)| name.contains(*stamp)).expect("an image of the bag");
         let off = (entry.base_from_tip.expect("a pose").matrix() - true_pose).amax();
-        // The robot is at some 0.2 m/s: at the stamps as they are it would be 9 mm off.
+        // The robot is at some 0.2 m/s: with unchanged stamps it would be 9 mm off.
         assert!(off < 2e-3, "{name}: {off}");
     }
     let run = command().args(["calibrate", "--quiet", "--json", "-"]).arg(&out).output().expect("it runs");

@@ -1,4 +1,4 @@
-//! Forward kinematics and Jacobians of arms out of URDF files, against Pinocchio.
+//! Forward kinematics and Jacobians of arms from URDF files, compared with Pinocchio.
 
 use std::process::Command;
 
@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 /// Configurations of each arm.
 const CONFIGURATIONS: usize = 1000;
 
-/// What we say of an arm: joints by name, values, and for these the tip's pose and the Jacobian in the axes of the base.
+/// Our values for an arm: joints by name, values, and for these the tip's pose and the Jacobian in the axes of the base.
 fn reported(file: &arms::ArmFile, rng: &mut ChaCha8Rng) -> Value {
     let arm = file.arm().expect("a good file");
     let names: Vec<&str> = arm.joints().iter().map(|joint| joint.name.as_str()).collect();
@@ -53,7 +53,7 @@ fn pinocchio_has_every_arm_where_we_have_it() {
         .expect("python runs");
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
-    // A line for each arm: the script compared them all.
+    // One line per arm: the script compared them all.
     assert_eq!(text(&output.stdout).lines().count(), arms::ALL.len(), "{}", text(&output.stdout));
     println!("{}", text(&output.stdout));
 }

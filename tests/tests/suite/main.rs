@@ -1,6 +1,6 @@
 //! All end-to-end tests in one program, which is linked once.
 //!
-//! `slow` is what the fast tier (`./test fast`) leaves out: real-time sequences, desktops, browsers, the long fuzz.
+//! `slow` is what the fast tier (`./test fast`) skips: real-time sequences, desktops, browsers, the long fuzz.
 
 mod command_line;
 mod documents;

@@ -1,4 +1,4 @@
-//! `handeye calibrate` on the reference data sets, real and rendered, as a user runs it.
+//! `handeye calibrate` on the reference data sets, real and rendered, as run by a user.
 
 use std::fmt::Write as _;
 use std::process::Command;
@@ -7,7 +7,7 @@ use handeye_geometry::testing::data_folder;
 use handeye_result::{CalibrationResult, ViewRecordStatus};
 use handeye_tests::handeye_binary;
 
-/// What is known of a set: hand-eye translation \[mm\] with the limit of its error, and focal length \[px\].
+/// What is known about a set: hand-eye translation \[mm\] with the limit of its error, and focal length \[px\].
 struct Truth {
     translation_mm: [f64; 3],
     limit_mm: f64,

@@ -1,4 +1,4 @@
-//! Images of the cell against the analytic projection of what is in them, with the detector that users have.
+//! Images of the cell compared with the analytic projection of its content, with the detector that users have.
 
 use handeye_cell::render::{BoardSurface, Imaging, Light, RenderScene, Renderer};
 use handeye_detect as detect;
@@ -14,7 +14,7 @@ const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.015 };
 const VIEWS: usize = 200;
 const FAR_M: f64 = 3.5;
 
-/// The board 0.3 to 0.55 m away, tilted by up to 45° about any axis in its plane, at any roll, wholly in view.
+/// The board 0.3 to 0.55 m away, tilted by up to 45° about any axis in its plane, at any roll, completely in view.
 fn random_pose(rng: &mut ChaCha8Rng, camera: &Intrinsics) -> Isometry3<f64> {
     let centre = TargetSpec::Chessboard(GRID).centre();
     loop {
@@ -94,8 +94,8 @@ fn corners_and_depths_are_where_the_lens_model_says() {
             bias.y,
             errors.len()
         );
-        // A third of a hundredth of a pixel is what rounding to grey levels leaves; the rest is for the straight edges that
-        // the model of a corner has where the lens bends them.
+        // A third of a hundredth of a pixel is the effect of rounding to grey levels; the rest is for the straight edges in
+        // the model of a corner, which the lens bends.
         assert!(bias.amax() <= 0.002 && rms <= 0.008, "{name}: bias {bias}, rms {rms}");
         assert!(depth_mm <= 0.1, "{name}: {depth_mm} mm");
     }

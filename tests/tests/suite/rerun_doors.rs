@@ -1,4 +1,4 @@
-//! Who is let in to a recording that is shown in a browser: programs and pages of this machine, and no crowd.
+//! Who has access to a recording that is shown in a browser: programs and pages of this machine, in limited numbers.
 
 use std::io::{BufRead as _, BufReader, ErrorKind, Read as _, Write as _};
 use std::net::TcpStream;
@@ -10,15 +10,15 @@ use handeye_tests::handeye_binary;
 /// Longer than anything takes on a busy machine.
 const PATIENCE: Duration = Duration::from_mins(2);
 
-/// As much of a recording as nobody else should get \[bytes\]; a refusal is shorter.
+/// Size of a recording that nobody else may get \[bytes\]; a refusal is shorter.
 const A_RECORDING: usize = 10_000;
 
 const READ: &str = "/rerun.sdk_comms.v1alpha1.MessageProxyService/ReadMessages";
 
-/// A session that is over and still shown.
+/// A session that is over and still served.
 struct Shown {
     process: Child,
-    /// Of the page and of the recording.
+    /// Port of the page and of the recording.
     port: u16,
 }
 
@@ -51,7 +51,7 @@ impl Shown {
         Self { process, port }
     }
 
-    /// A number of the process by its name in the system.
+    /// A value of the process by its name in the system.
     fn number(&self, name: &str) -> u64 {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.process.id())).expect("it runs");
         let line = status.lines().find_map(|line| line.strip_prefix(name)).expect("a number");
@@ -65,7 +65,7 @@ fn connect(port: u16) -> TcpStream {
     socket
 }
 
-/// Reads until there is a recording, or the end; what was read.
+/// Reads until there is a recording, or the end; returns what was read.
 fn read(socket: &mut TcpStream) -> Vec<u8> {
     let mut reported = Vec::new();
     let mut piece = vec![0; 16 * 1024];
@@ -80,7 +80,7 @@ fn read(socket: &mut TcpStream) -> Vec<u8> {
     reported
 }
 
-/// Asks as a page does: the line with the status, and how much came.
+/// Sends a request like a page: the status line, and how much came.
 fn asked_by_a_page(port: u16, headers: &str) -> (String, usize) {
     let mut socket = connect(port);
     let head = format!(
@@ -92,7 +92,7 @@ fn asked_by_a_page(port: u16, headers: &str) -> (String, usize) {
     (String::from_utf8_lossy(&reported).lines().next().unwrap_or_default().to_owned(), reported.len())
 }
 
-/// A frame of HTTP/2 on stream 1, or on none for settings.
+/// A frame of HTTP/2 on stream 1, or on stream 0 for settings.
 fn frame(kind: u8, flags: u8, content: &[u8]) -> Vec<u8> {
     let length = (content.len() as u32).to_be_bytes();
     let stream = u8::from(kind != 4);
@@ -101,9 +101,9 @@ fn frame(kind: u8, flags: u8, content: &[u8]) -> Vec<u8> {
     frame
 }
 
-/// Asks as the native viewer does, over HTTP/2, which says the name in `:authority`: how much came.
+/// Sends a request like the native viewer, over HTTP/2, with the name in `:authority`: how much came.
 fn asked_by_a_viewer(port: u16, authority: &str) -> usize {
-    // Headers by their number in the table of HPACK, with values as they are.
+    // Headers by their index in the table of HPACK, with literal values.
     let mut headers = vec![0x83, 0x86];
     for (name, value) in [(&[0x04][..], READ), (&[0x01][..], authority), (&[0x0f, 0x10][..], "application/grpc")] {
         headers.extend_from_slice(name);
@@ -128,7 +128,7 @@ fn asked_by_a_viewer(port: u16, authority: &str) -> usize {
         let (kind, ends) = (head[3], head[4] & 1 == 1);
         match kind {
             0 => taken += length,
-            // Settings are to be acknowledged.
+            // Settings have to be acknowledged.
             4 if !ends => socket.write_all(&frame(4, 1, &[])).expect("sent"),
             3 | 7 => break,
             _ => {}
@@ -185,12 +185,12 @@ fn connections_that_ask_nothing_hold_neither_threads_nor_memory_and_lock_nobody_
     let mut dribbling = Vec::new();
     for n in 0..500 {
         let mut socket = connect(port);
-        // Those that were given up to make room are gone already. Half of them begin with HTTP/2.
+        // Those that were closed to make room are gone already. Half of them begin with HTTP/2.
         let begun = if n % 2 == 0 { "GET / HTTP/1.1\r\nHost: 127" } else { "PRI * HTTP/2.0\r\n\r\nSM" };
         let _sent = socket.write_all(begun.as_bytes()).is_ok();
         dribbling.push(socket);
     }
-    // While they are there, and no later than without them.
+    // While they are connected, and as soon as without them.
     let mut socket = connect(port);
     socket.write_all(b"GET /rerun/?x=1 HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n").expect("sent");
     assert!(read(&mut socket).starts_with(b"HTTP/1.1 200"));
@@ -203,8 +203,8 @@ fn connections_that_ask_nothing_hold_neither_threads_nor_memory_and_lock_nobody_
         kilobytes / 1024,
         kilobytes_now / 1024
     );
-    // Whoever is served may need a few; those who ask nothing need none, however many they are.
+    // Served clients may need a few threads; idle ones need none, however many they are.
     assert!(threads_now <= threads + 8, "{threads} {threads_now}");
-    // The size of a recording that is sent, and of a hundred heads of requests.
+    // The size of a recording that is sent, and of the heads of a hundred requests.
     assert!(kilobytes_now < kilobytes + 64 * 1024, "{kilobytes} {kilobytes_now}");
 }

@@ -7,7 +7,7 @@ use handeye_coppeliasim::cell::{Arm, CameraFeed, CellClient, CellPaths};
 use handeye_coppeliasim::{CancelToken, ConnectionOptions, Endpoint, LinkError, MotionLimits};
 use handeye_tests::CellProcess;
 
-/// What a user is promised: a dead cell is reported within this.
+/// The guarantee to users: a dead cell is reported within this time.
 const NOTICED_WITHIN: Duration = Duration::from_secs(2);
 /// A restarted cell answers within this on a busy machine.
 const BACK_WITHIN: Duration = Duration::from_secs(30);
@@ -17,7 +17,7 @@ fn connect(port: u16) -> (Arm, CameraFeed) {
     cell.expect("the cell is there").split()
 }
 
-/// Calls until it answers; every failure on the way has to be one of a connection.
+/// Calls until it answers; every failure before that has to be a connection error.
 fn until_it_answers<T>(mut call: impl FnMut() -> Result<T, LinkError>) -> T {
     let start = Instant::now();
     loop {
@@ -49,7 +49,7 @@ fn a_cell_killed_in_a_move_is_reported_and_taken_up_again() {
         (arm, outcome, Instant::now())
     });
     has_moved.recv().expect("the move begins");
-    // A second client sees the arm move, so the kill falls into the move.
+    // A second client sees the arm move, so the kill happens during the move.
     let (mut witness, _) = connect(port);
     let start = witness.joint_values().expect("answers");
     while witness.joint_values().expect("answers") == start {}

@@ -1,5 +1,5 @@
-//! `assets/scenes/build_reference_scene.py`, unmodified, with the vendor's client: what it builds is the cell that the
-//! built-in one has with the same scene file, and what cannot be built is refused.
+//! `assets/scenes/build_reference_scene.py`, unmodified, with the vendor's client: it builds the same cell as the
+//! built-in one with the same scene file, and what cannot be built is refused.
 
 use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
@@ -13,12 +13,12 @@ use handeye_tests::{CellProcess, workspace_root};
 use handeye_wire::Reader as _;
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-/// What it makes, and the arm, which it loads.
+/// What it creates, and the arm, which it loads.
 const PARTS: [&str; 6] = ["/UR5", "/UR5/Tip", "/UR5/Target", "/UR5/3D_camera", "/UR5/3D_camera/depth", "/Plane"];
 /// Rounding of products of poses, metres and radians.
 const ROUNDING: f64 = 1e-9;
 
-/// No number is that of the reference scene, and poses say only what they differ in.
+/// No number is that of the reference scene, and poses only state their differences.
 const ANOTHER: &str = r"
 [robot]
 joint_mode = 'dynamic'
@@ -44,7 +44,7 @@ paper_m = [0.24, 0.21]
 plane = { position_m = [0.5, 0.1, 0.2], rotation_xyzw = [0.36, 0.48, 0.0, 0.8] }
 ";
 
-/// What there was before the script, and what there is after it.
+/// What existed before the script, and after it.
 struct Built {
     server: StandIn,
     own: Vec<(i64, Isometry3<f64>)>,
@@ -59,7 +59,7 @@ struct Lens {
 }
 
 impl Built {
-    /// By the script with these arguments, before a cell with the scene of `text`.
+    /// With the script and these arguments, on a cell with the scene of `text`.
     fn with(python: &Path, text: &str, arguments: &[&str]) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("scene.toml");
@@ -79,7 +79,7 @@ impl Built {
         self.server.calls.iter().filter(move |call| call.function == format!("sim.{function}"))
     }
 
-    /// Everything is where the cell has it.
+    /// Everything is at its place in the cell.
     fn assert_poses(&mut self) {
         for (path, (own, expected)) in PARTS.iter().zip(&self.own) {
             let (handle, pose) = place(&mut self.server, path);
@@ -89,7 +89,7 @@ impl Built {
         }
     }
 
-    /// Both sensors see as that of the cell does, one colour and one depth.
+    /// Both sensors have the optics of that of the cell, one for colour and one for depth.
     fn assert_sensors(&mut self) {
         // Names and numbers of the API: handled with all others (not 1), in perspective (2), without a drawn volume (4).
         const OPTIONS: i64 = 2 + 4;
@@ -113,7 +113,7 @@ impl Built {
         }
     }
 
-    /// The squares are those of the cell's own board; gives how many are dark.
+    /// The squares are those of the cell's own board; returns how many are dark.
     fn assert_board(&mut self) -> usize {
         let truth = self.server.cell.call("handeye.truth", Vec::new()).expect("the truth").values()[0].clone();
         let number = |name: &str| truth.get("target").and_then(|board| board.get(name)?.number()).expect("a number");
@@ -145,7 +145,7 @@ impl Built {
             }
             assert!(grey.iter().all(|&value| value < 0.1), "squares are dark");
             let world_from_square = pose(&self.server.ask("getObjectPose", vec![handle.into(), (-1).into()])[0]);
-            // On the printed side, in front of the sheet by less than a depth camera or a corner detector could see.
+            // On the printed side, in front of the sheet by less than a depth camera or a corner detector can resolve.
             let lift_m = world_from_sheet.inv_mul(&world_from_square).translation.z;
             assert!(lift_m > 0.0 && lift_m < 5e-5, "{lift_m} m");
             let target_from_square = world_from_target.inv_mul(&world_from_square);
@@ -233,7 +233,7 @@ fn the_script_builds_the_reference_scene_with_its_defaults() {
     for left_alone in ["setJointInterval", "setJointMode", "saveScene"] {
         assert_eq!(built.calls(left_alone).count(), 0, "{left_alone}");
     }
-    // They would be taken to their targets when the simulation starts, and by the model's script.
+    // They would move to their targets when the simulation starts, and by the model's script.
     for (joint, start_deg) in built.server.joints().into_iter().zip([0.0_f64, 45.0, -60.0, 0.0, 90.0, 0.0]) {
         let target = built.server.ask("getJointTargetPosition", vec![joint.into()])[0].number().expect("a number");
         assert!((target - start_deg.to_radians()).abs() < ROUNDING, "{target}");

@@ -1,4 +1,4 @@
-//! Who is let in by `handeye serve`, and what it holds for those who are not.
+//! Who has access to `handeye serve`, and its limits for clients without access.
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
@@ -7,7 +7,7 @@ use handeye_tests::served::{SOON, Served, frame};
 use serde_json::json;
 use tungstenite::Message;
 
-/// A request to become the connection of a page.
+/// A request to upgrade to the connection of a page.
 fn upgrade(host: &str, more: &str) -> String {
     format!(
         "GET /socket?page=x HTTP/1.1\r\nHost: {host}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
@@ -29,7 +29,7 @@ fn pages_of_other_sites_files_elsewhere_and_forms_are_refused() {
     ] {
         assert_eq!(status(&upgrade(host, more)), "403", "{host} {more}");
     }
-    // A program that is no page.
+    // A program that is not a page.
     assert_eq!(status(&upgrade("ADDRESS", "")), "400");
     for path in ["/../Cargo.toml", "/client.js/../../etc/passwd", "/%2e%2e/etc/passwd", "/exports"] {
         assert_eq!(status(&format!("GET {path} HTTP/1.1\r\nHost: ADDRESS\r\n\r\n")), "404", "{path}");
@@ -76,7 +76,7 @@ fn broken_messages_and_a_thousand_silent_connections_leave_the_driving_page_alon
     let before = served.megabytes();
 
     let silent: Vec<TcpStream> = (0..1000).filter_map(|_| TcpStream::connect(&served.address).ok()).collect();
-    // Each of these ends its own connection and nothing else.
+    // Each of these ends its own connection only.
     let broken: Vec<Message> = vec![
         Message::text("{"),
         Message::text("[]"),
@@ -115,7 +115,7 @@ fn however_many_uploads_there_were_another_is_taken_and_slow_ones_lock_no_page_o
         let answer = served.ask(&post(&format!("quick{number}"), 1, "x"));
         assert!(answer.starts_with("HTTP/1.1 204"), "{number}: {answer}");
     }
-    // More than there are connections; of each the beginning.
+    // More than the number of connections; only the beginning of each.
     let slow: Vec<TcpStream> = (0..100)
         .filter_map(|number| {
             let mut socket = TcpStream::connect(&served.address).ok()?;
@@ -136,7 +136,7 @@ fn however_many_uploads_there_were_another_is_taken_and_slow_ones_lock_no_page_o
 #[test]
 fn a_folder_is_downloaded_by_one_at_a_time_and_for_no_other_site() {
     let folder = tempfile::tempdir().expect("a folder");
-    // More than the system keeps for somebody who does not read.
+    // More than the system buffers for a client that does not read.
     std::fs::write(folder.path().join("large.png"), vec![7; 64 << 20]).expect("written");
     std::fs::write(folder.path().join("result.json"), "{}").expect("written");
     let name = folder.path().display().to_string();
@@ -162,11 +162,11 @@ fn a_folder_is_downloaded_by_one_at_a_time_and_for_no_other_site() {
     assert!(served.ask(&get("")).starts_with("HTTP/1.1 503"), "another while the first is under way");
     let grown = served.megabytes() - before;
     assert!(grown < 32.0, "{grown} MB are kept of 64 that nobody takes");
-    // The first read may hold the start of the archive behind the header.
+    // The first read may hold the start of the archive after the header.
     begun.truncate(count);
     first.read_to_end(&mut begun).expect("the whole archive");
     assert!(begun.len() > 64 << 20, "{} bytes", begun.len());
-    // Its place is free when the last of it was taken.
+    // Its slot is free when the end was read.
     let deadline = std::time::Instant::now() + SOON;
     while !served.ask(&get("")).starts_with("HTTP/1.1 200") {
         assert!(std::time::Instant::now() < deadline, "its place is not given back");

@@ -1,4 +1,4 @@
-//! The command line on sessions: their journal is what they say, and every command reads the same of it.
+//! The command line on sessions: the journal is authoritative, and every command reads the same from it.
 
 use std::fs;
 use std::path::Path;
@@ -25,7 +25,7 @@ fn status(result: &CalibrationResult) -> Vec<(String, ViewRecordStatus)> {
     result.views.iter().map(|view| (view.name.clone(), view.status)).collect()
 }
 
-/// Keeps two captures for verification and takes one of them and another one out.
+/// Keeps two captures for verification and excludes one of them and another one.
 fn edit(session: &Path) {
     let mut store = Store::open(session).expect("open");
     store.apply(Edit::SetRole { ids: vec![CaptureId(1), CaptureId(6)], role: Role::Verification }).expect("role");
@@ -50,7 +50,7 @@ fn captures_that_are_excluded_or_verify_touch_no_number_and_are_named_for_what_t
     assert_eq!(diagnosed(&session)["hypotheses"], diagnosed(&without)["hypotheses"]);
 
     assert_eq!((result.verification.map(|it| it.captures), reference.verification), (Some(1), None));
-    // The capture that verifies is checked, and the one that was taken out of that as well is not.
+    // The verifying capture is checked, and the excluded one is not.
     let report = handeye(&["calibrate", "-q", utf8(&session)]);
     let report = text(&report.stdout);
     assert!(report.contains("verification on 1 capture"), "{report}");
@@ -65,7 +65,7 @@ fn a_session_is_read_from_its_journal_and_not_from_the_files_that_follow_from_it
     let (_home, session) = copy_of_session();
     edit(&session);
     let (result, diagnosis) = (calibrated(&session), diagnosed(&session));
-    // Another program has put the poses into another order, and another target into the description.
+    // Another program has reordered the poses, and changed the target in the description.
     let table = fs::read_to_string(session.join("poses.csv")).expect("text");
     let mut cells: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
     let name = cells[1][0];
@@ -103,7 +103,7 @@ fn journal_images_and_depths_are_enough_for_every_command() {
     let (bare_images, bare_transforms) = views(&session, "bare");
     assert_eq!(bare_images.expect("written"), images.expect("written"));
     assert_eq!(bare_transforms.expect("written"), transforms.expect("written"));
-    // The answer of the corners is another one than that of corners and depths, and nothing is known of a depth camera.
+    // The answer from the corners differs from that from corners and depths, and nothing is known about a depth camera.
     fs::remove_dir_all(session.join("depth")).expect("removed");
     let of_corners = calibrated(&session);
     assert_eq!(of_corners.depth, None);

@@ -55,7 +55,7 @@ model = "none"
     }
 }
 
-/// Folders `monday`, `tuesday` and `wednesday` of one camera, the second on a stand beside the robot.
+/// Folders `monday`, `tuesday` and `wednesday` of one camera, the second on a stand next to the robot (eye to hand).
 fn sessions(home: &Path) -> [PathBuf; 3] {
     let folders = ["monday", "tuesday", "wednesday"].map(|name| home.join(name));
     let modes = [(Mode::EyeInHand, 10), (Mode::EyeToHand, 12), (Mode::EyeInHand, 8)];
@@ -98,7 +98,7 @@ fn sessions_get_a_result_each_as_one_alone_does_and_all_have_one_lens() {
         let fx = |result: &CalibrationResult| result.intrinsics.as_ref().and_then(|it| it.sigma.fx).expect("estimated");
         assert!(fx(result) < fx(&alone), "{} {}", fx(result), fx(&alone));
         assert_eq!(result.provenance.input_sha256, alone.provenance.input_sha256);
-        // What a result has depends on no flag, but for the note that there were others.
+        // The content of a result depends on no flag, except for the note that there were others.
         assert_eq!(result.provenance.options["share_intrinsics"].as_array().map(Vec::len), Some(2));
         let keys = |result: &CalibrationResult| {
             let value = serde_json::to_value(result).expect("JSON");
@@ -170,7 +170,7 @@ fn what_cannot_share_a_lens_is_wrong_usage_that_says_what_to_do() {
     refused(&[a, b, c, "--share-intrinsics"], "fixed = false");
     let few = handeye(&["calibrate", "-q", a, utf8(&home.path().join("nowhere")), "--share-intrinsics"]);
     assert_eq!(few.status.code(), Some(2));
-    // A session that has no answer is no wrong usage, and it is named.
+    // A session without an answer is not wrong usage, and it is named.
     let poses = fs::read_to_string(folders[1].join("poses.csv")).expect("a table");
     let two: Vec<&str> = poses.lines().take(3).collect();
     fs::write(folders[1].join("poses.csv"), two.join("\n") + "\n").expect("written");

@@ -6,10 +6,10 @@ use std::sync::LazyLock;
 
 use handeye_tests::handeye_binary;
 
-/// What one run of `handeye auto --json -` has left.
+/// The result of one run of `handeye auto --json -`.
 pub struct Solved {
     folder: PathBuf,
-    /// What it printed.
+    /// Its output.
     pub auto: Output,
 }
 
@@ -48,7 +48,7 @@ fn copy_folder(from: &Path, to: &Path) {
     }
 }
 
-/// The program, with nothing of the terminal of the test.
+/// The program, independent of the terminal of the test.
 pub fn command() -> Command {
     let mut command = Command::new(handeye_binary());
     command.stdin(Stdio::null()).env_remove("RUST_LOG");

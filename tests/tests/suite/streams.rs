@@ -1,4 +1,4 @@
-//! Output that nobody reads, that does not fit on the disk, or that goes to something that is no file.
+//! Output that nobody reads, that does not fit on the disk, or that goes to something other than a file.
 
 use std::fs::{self, File};
 use std::io::Read as _;
@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use crate::solved::{command, copy_of_session, handeye, solved, text, utf8};
 
-/// A pipe whose reader is gone, as that of `| true`.
+/// A pipe whose reader is gone, as with a shell pipe into `true`.
 fn closed() -> Stdio {
     let (reader, writer) = std::io::pipe().expect("a pipe");
     drop(reader);
@@ -81,7 +81,7 @@ fn a_gate_is_kept_when_nobody_reads_the_report() {
 fn messages_that_cannot_be_said_stop_nothing() {
     let (home, session) = copy_of_session();
     for stream in [closed as fn() -> Stdio, full] {
-        // With its lines of progress, and without anything to say but an error.
+        // With its lines of progress, and without any output except an error.
         let output = run(command().args(["calibrate", utf8(&session)]).stdout(Stdio::piped()).stderr(stream()));
         assert_eq!(output.status.code(), Some(0));
         assert!(text(&output.stdout).starts_with("Hand-eye calibration"), "{}", text(&output.stdout));
@@ -121,7 +121,7 @@ fn every_json_goes_to_standard_output_alone_when_it_is_asked_for() {
         let tracked: Value = serde_json::from_slice(&tracked.stdout).expect("nothing but the track");
         assert_eq!(tracked["frames"].as_array().map(Vec::len), Some(3));
     }
-    // Where standard output is a file that is open already, it is that file and not a new one of its name.
+    // If standard output is an open file, it is that file and not a new one of its name.
     let file = session.join("out.json");
     let stdout = File::create(&file).expect("a file");
     let output = run(command().args(["-q", "calibrate", path, "--json", "/dev/stdout"]).stdout(stdout));
@@ -130,7 +130,7 @@ fn every_json_goes_to_standard_output_alone_when_it_is_asked_for() {
     assert!(Path::new("/dev/stdout").is_symlink());
 }
 
-/// Runs a command that writes to a pipe and gives what came out of it.
+/// Runs a command that writes to a pipe and returns its output.
 fn through_pipe(pipe: &Path, arguments: &[&str]) -> Vec<u8> {
     assert!(Command::new("mkfifo").arg(pipe).status().expect("mkfifo").success());
     let path = pipe.to_path_buf();

@@ -1,5 +1,5 @@
 //! What must hold between crates beyond what Cargo refuses to build: no module that estimates names the truth, and a
-//! program that estimates is built without what it has no use for.
+//! program that estimates is built without crates that it does not need.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -8,13 +8,13 @@ use std::process::Command;
 use handeye_tests::workspace_root;
 use serde_json::Value;
 
-/// What names the truth that a simulated cell publishes for reports and tests.
+/// Names of the truth that a simulated cell publishes for reports and tests.
 const TRUTH: [&str; 3] = ["GroundTruth", "ground_truth", "TruthComparison"];
 
-/// Crates from whose sources an estimate comes.
+/// Crates whose sources produce an estimate.
 const ESTIMATING: [&str; 9] = ["arm", "capture", "detect", "estimate", "files", "geometry", "import", "plan", "track"];
 
-/// Crates that a program may be built with which only estimates, itself included.
+/// Limit of crates in a program that only estimates, itself included.
 const MOST_CRATES: usize = 60;
 
 /// Lines of a source that name the truth, tests excepted.

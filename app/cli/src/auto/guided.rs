@@ -18,15 +18,15 @@ use super::sequence::PoseSequence;
 use handeye_workbench::model::CapturePurpose;
 use handeye_workbench::text::Language;
 
-/// A guided session on its way.
+/// A guided session in progress.
 pub struct GuidedSequence<'a, 's> {
-    /// What goes to poses and captures there.
+    /// The sequence that visits poses and captures there.
     pub sequence: &'a mut PoseSequence<'s>,
     /// What chooses the poses.
     pub guide: &'a mut Guide,
     /// Captures that check the answer afterwards.
     pub checks: usize,
-    /// Where to go if the board is not in view from where the arm stands, one after the other.
+    /// Where to go if the board is not in view from the arm's position, one after the other.
     pub towards_board: Vec<TowardsBoard>,
     /// What was found in the captures.
     sights: BTreeMap<CaptureId, Sight>,
@@ -95,7 +95,8 @@ impl<'a, 's> GuidedSequence<'a, 's> {
         Ok(ending)
     }
 
-    /// Goes to where the board should be in view, on ways that are known to be free; whether it was captured there.
+    /// Goes to where the board should be in view, on paths that are known to be free; returns whether it was captured
+    /// there.
     fn look_for_board(&mut self) -> Result<bool, Failure> {
         let goals = std::mem::take(&mut self.towards_board);
         for TowardsBoard { name, goal } in goals {
@@ -107,7 +108,7 @@ impl<'a, 's> GuidedSequence<'a, 's> {
         Ok(false)
     }
 
-    /// Captures that were not designed and never enter the fit.
+    /// Captures that were not planned for the fit and never enter it.
     fn check(&mut self, observations: &Observations, calibration: Option<&Calibration>) -> Result<(), Failure> {
         for index in 0..self.checks {
             let robot = self.robot()?;
@@ -135,7 +136,7 @@ impl<'a, 's> GuidedSequence<'a, 's> {
         }
     }
 
-    /// Whether it gave a capture, there or where the arm stands.
+    /// Whether it gave a capture, there or at the arm's position.
     fn visit(&mut self, goal: Option<&Goal>, purpose: CapturePurpose) -> Result<bool, Failure> {
         self.number += 1;
         let name = match purpose {
@@ -151,7 +152,7 @@ impl<'a, 's> GuidedSequence<'a, 's> {
         Ok(true)
     }
 
-    /// What the captures give, with what speaks against it.
+    /// The result of the captures, with its findings.
     fn solve(&self) -> Result<(Observations, Option<Calibration>), Failure> {
         let document = self.sequence.session.document();
         let seen = document.observations(self.image_size, |id| self.sights.get(&id).cloned());
@@ -175,7 +176,7 @@ impl<'a, 's> GuidedSequence<'a, 's> {
     }
 }
 
-/// Where the arm goes: to the joint values whose way was checked, and nowhere else.
+/// Where the arm goes: only to joint values with a checked path.
 fn joints(proposal: Option<&Proposal>) -> Result<Goal, Failure> {
     let joints = proposal.and_then(|proposal| proposal.joints);
     let joints =

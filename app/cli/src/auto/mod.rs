@@ -53,8 +53,8 @@ pub struct AutoArgs {
     poses: Option<String>,
     #[command(flatten)]
     guided: GuidedArgs,
-    /// What the arm must not touch, besides what the scene has: a file of boxes, with a work volume and limits of speed if wanted
-    /// (docs/reference/surroundings.md). Every motion to joint values is then checked before it begins.
+    /// What the arm must not touch, in addition to what the scene has: a file of boxes, with a work volume and limits of speed if
+    /// wanted (docs/reference/surroundings.md). Every motion to joint values is then checked before it begins.
     #[arg(long, value_name = "FILE", help_heading = heading::CELL)]
     keep_out: Option<PathBuf>,
     /// The chain of the arm by a built-in name or a URDF file, in place of the one that is read from the simulation. One
@@ -71,7 +71,7 @@ pub struct AutoArgs {
     /// kind=charuco,columns=… with the options of `handeye target`.
     #[arg(long, value_name = "TEXT", help_heading = heading::TARGET)]
     target: Option<String>,
-    /// Whether the camera is on the arm (eye_in_hand) or beside it, with the board on the arm (eye_to_hand); eye_in_hand if not
+    /// Whether the camera is on the arm (eye_in_hand) or next to it, with the board on the arm (eye_to_hand); eye_in_hand if not
     /// given.
     #[arg(long, value_name = "MODE", value_parser = mode, help_heading = heading::CELL)]
     mode: Option<Mode>,
@@ -97,10 +97,10 @@ struct GuidedArgs {
     /// known, else that of a measured point; 0.3 if not given.
     #[arg(long, value_name = "MM", value_parser = positive, help_heading = heading::GUIDED)]
     goal: Option<f64>,
-    /// Captures at the most; 40 if not given.
+    /// Most captures; 40 if not given.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(3..=400), help_heading = heading::GUIDED)]
     max_poses: Option<u32>,
-    /// Minutes of the cell's time at the most; no limit if not given.
+    /// Most minutes, in the cell's time; no limit if not given.
     #[arg(long, value_name = "MIN", value_parser = positive, help_heading = heading::GUIDED)]
     max_minutes: Option<f64>,
     /// Captures afterwards, at poses at random, that never enter the fit and check the answer; 3 if not given.
@@ -194,7 +194,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     if let Some(keep_out) = &keep_out {
         cell.keep_out(keep_out)?;
     }
-    // That the chain is not known is no fault: joint angles are then kept and not used.
+    // An unknown chain is not an error: joint angles are then kept and not used.
     if let (true, Err(unknown)) = (is_guided, cell.robot()?) {
         return Err(Failure::failed(anyhow::anyhow!(
             "guided capture takes an arm whose chain is known: {unknown}; give the poses by a file, --poses FILE"
@@ -243,7 +243,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
         }
         None => sequence.run().map(|()| None),
     };
-    // The simulation ends unless somebody else had started it.
+    // The simulation ends unless it was running before.
     cell.leave(captured.is_err() || cancel.is_cancelled(), !(ran_before || args.leave_running));
     if captured.is_err() && !session.document().captures.is_empty() {
         let (count, folder) = (session.document().captures.len(), folder.display());
@@ -274,8 +274,8 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     }
 }
 
-/// The board: that of the built-in cell and of the public scene, or the one that was described. What lies before a real camera is
-/// never guessed.
+/// The board: that of the built-in cell and of the public scene, or the one that was described. The board of a real cell is never
+/// guessed.
 fn target_of(args: &AutoArgs) -> Result<TargetSpec, Failure> {
     match &args.target {
         Some(text) => arguments::of_text(text).map_err(Failure::unusable),
@@ -286,7 +286,7 @@ fn target_of(args: &AutoArgs) -> Result<TargetSpec, Failure> {
     }
 }
 
-/// The chain that `--arm` names, once it agrees with what the robot reports.
+/// The chain named by `--arm`, once it agrees with what the robot reports.
 fn named_arm(named: &str, cell: &mut OpenCell) -> Result<ArmKinematics, Failure> {
     let here = cell.robot_state()?.joints_rad;
     if let Some(read) = cell.kinematics() {
@@ -328,7 +328,7 @@ fn finish(session: &Store, json: Option<&Output>, solution: &Solution) -> Result
 }
 
 /// Moves a session that is already there out of the way: nothing captured is ever overwritten. A session that another
-/// program has open stays where it is, or that program would go on writing into the new one.
+/// program has open is not moved, or that program would continue writing into the new one.
 fn keep_earlier_session(folder: &Path) -> Result<(), Failure> {
     if !Session::is_session(folder) {
         return Ok(());

@@ -12,21 +12,21 @@ use super::super::{Failure, towards_board};
 use handeye_link::limits;
 use handeye_workbench::session::start::REFERENCE_POSES;
 
-/// How much the board is tilted at most where guided capture begins.
+/// Largest tilt of the board at the start of guided capture.
 const FIRST_TILT_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// How many views `--poses auto` plans.
 const PLANNED_VIEWS: usize = 20;
 
 /// The ten reference poses.
 pub const REFERENCE: &str = "seed10";
-/// Poses that are chosen on the way.
+/// Poses that are chosen along the way.
 pub const GUIDED: &str = "guided";
 /// Views of the board that are planned beforehand.
 pub const PLANNED: &str = "auto";
 
 /// A sequence of poses.
 pub struct Plan {
-    /// Where the arm begins.
+    /// Where the arm starts.
     pub start_joints: Option<Vec<f64>>,
     /// Names and goals in order.
     pub goals: Vec<(String, Goal)>,
@@ -71,7 +71,7 @@ impl Plan {
         }
     }
 
-    /// No pose but the one to begin at: with the board in view, as a person jogs the arm first.
+    /// No pose except the start: with the board in view, where a user would jog the arm first.
     fn begun(scene: &Scene, seed: Option<u64>) -> Result<Self, Failure> {
         let resolved = meant(scene, seed)?;
         let options = ViewOptions { count: 1, cone_rad: FIRST_TILT_RAD, seed: resolved.seed, ..ViewOptions::default() };
@@ -80,8 +80,8 @@ impl Plan {
         Ok(Self { start_joints, goals: Vec::new(), limits: limits::SEQUENCE })
     }
 
-    /// Views of the board of a cell that is running, from where its arm stands: by its truth where it publishes that, and else by
-    /// where its scene has board and camera.
+    /// Views of the board of a cell that is running, from where its arm is: from its ground truth if it publishes that, and else
+    /// from where its scene has board and camera.
     pub fn planned_here(cell: &mut OpenCell, seed: u64) -> Result<Self, Failure> {
         let board = towards_board::board_in_view(cell)?.ok_or_else(|| {
             Failure::failed(anyhow::anyhow!(
@@ -98,12 +98,12 @@ impl Plan {
         Ok(Self { start_joints: None, goals: named(views.iter()), limits: limits::SEQUENCE })
     }
 
-    /// None at all: the arm begins where it stands.
+    /// No poses: the arm starts where it is.
     pub fn from_here() -> Self {
         Self { start_joints: None, goals: Vec::new(), limits: limits::SEQUENCE }
     }
 
-    /// Views from where the scene says that board and camera are *meant* to be: what a person planning a sequence knows.
+    /// Views from where the scene says that board and camera are *meant* to be: what a user planning a sequence knows.
     fn planned(scene: &Scene, seed: Option<u64>) -> Result<Self, Failure> {
         let resolved = meant(scene, seed)?;
         let seed = resolved.seed;

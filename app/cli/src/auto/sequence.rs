@@ -17,12 +17,12 @@ use handeye_workbench::capture::{self, CaptureEnd, CaptureRequest, Measured};
 use handeye_workbench::model::{CaptureOptions, CapturePurpose, LiveFrame, RefusalKind};
 use handeye_workbench::text::{Language, Text};
 
-/// How often a conversation that broke on the way to one pose is taken up again.
+/// How often an interrupted operation at one pose is retried.
 const TRIES: u32 = 3;
-/// Pause before such a try: a network comes back when the computer wakes up, and a server that died is reported within
-/// two seconds.
+/// Pause before such a retry: a network comes back when the computer wakes up, and a dead server is reported within two
+/// seconds.
 const BEFORE_TRY: Duration = Duration::from_millis(400);
-/// Between two looks at a simulation that is paused.
+/// Between two checks of a paused simulation.
 const LOOK: Duration = Duration::from_millis(100);
 
 /// A sequence of the poses of a plan.
@@ -30,7 +30,7 @@ pub struct PoseSequence<'a> {
     pub cell: &'a mut OpenCell,
     pub plan: &'a Plan,
     pub options: CaptureOptions,
-    /// Whether the simulation keeps its own pace.
+    /// Whether the simulation runs at its own pace.
     pub real_time: bool,
     pub session: &'a mut Store,
     pub recorder: &'a Recorder,
@@ -48,13 +48,13 @@ pub struct Images {
     newest_s: Option<f64>,
 }
 
-/// What came of a pose.
+/// The outcome of a pose.
 enum Visit {
     Ended(CaptureEnd),
     LeftOut(Text),
 }
 
-/// Why work at a pose did not come to its end.
+/// Why work at a pose did not finish.
 enum Trouble {
     Port(PortError),
     /// Another client holds the simulation.
@@ -90,7 +90,7 @@ impl From<Trouble> for Failure {
 
 impl PoseSequence<'_> {
     /// Visits every pose and captures there. A pose that the arm cannot reach, or that gives no capture, is named and
-    /// left out; anything else ends the sequence.
+    /// skipped; anything else ends the sequence.
     pub fn run(&mut self) -> Result<(), Failure> {
         let plan = self.plan;
         self.begin()?;
@@ -109,7 +109,7 @@ impl PoseSequence<'_> {
         Ok(())
     }
 
-    /// Starts the simulation and goes to where the plan begins.
+    /// Starts the simulation and goes to the start of the plan.
     pub fn begin(&mut self) -> Result<(), Failure> {
         self.cell.set_going(!self.real_time).map_err(|error| port_failure(&error))?;
         let Some(start) = self.plan.start_joints.clone().map(Goal::Joints) else { return Ok(()) };
@@ -119,8 +119,8 @@ impl PoseSequence<'_> {
         })
     }
 
-    /// Goes to a pose, if not where the arm stands, and captures there; the capture, recorded in the session. `None` for a pose
-    /// that the arm cannot reach, or that gives no capture: why is in the log.
+    /// Goes to a pose, if not at the arm's position, and captures there; the capture, recorded in the session. `None` for a
+    /// pose that the arm cannot reach, or that gives no capture: the reason is in the log.
     pub fn visit(
         &mut self,
         number: u64,
@@ -145,7 +145,7 @@ impl PoseSequence<'_> {
                 has_come_to_rest: goal.is_some(),
             };
             match capture::take(request, &target, &mut eye, sequence.cancel)? {
-                // The next try waits for the simulation, and takes the capture from the beginning.
+                // The next retry waits for the simulation, and takes the capture from the beginning.
                 CaptureEnd::Refused(refused) if refused.kind == RefusalKind::Paused => Err(Trouble::Paused),
                 ended => Ok(Visit::Ended(ended)),
             }
@@ -171,7 +171,7 @@ impl PoseSequence<'_> {
     fn go_to(&mut self, what: &str, goal: &Goal) -> Result<Result<(), Text>, Trouble> {
         match self.cell.move_to(what, goal, self.cancel)? {
             MotionOutcome::Arrived => Ok(Ok(())),
-            // A driver that no longer moves its robot does not move it to the next pose, either.
+            // A driver that no longer moves its robot will not move it to the next pose, either.
             MotionOutcome::Refused(why) if !self.cell.is_simulated() && !self.is_armed() => Err(Trouble::Failed(why)),
             MotionOutcome::Refused(why) | MotionOutcome::Unreached(why) => Ok(Err(why)),
             MotionOutcome::Held(why) => Err(Trouble::Held(why)),
@@ -185,9 +185,9 @@ impl PoseSequence<'_> {
         matches!(self.cell.control.state(), Ok(Some(state)) if state.is_armed)
     }
 
-    /// Does something that can be done again in a simulation: a computer that slept is forgotten by the server, and with it its
-    /// stepping and the motion that was under way; the arm stands where it was. A robot behind a driver is not moved again by
-    /// itself.
+    /// Does something that can be retried in a simulation: a computer that slept is dropped by the server, and with it its
+    /// stepping and the motion that was under way; the arm stays where it was. A robot behind a driver is not moved again
+    /// automatically.
     fn persisting<T>(
         &mut self,
         what: &str,
@@ -215,7 +215,7 @@ impl PoseSequence<'_> {
                     thread::sleep(BEFORE_TRY);
                     self.take_up_again().and_then(|()| work(self))
                 }
-                // A client that was killed is forgotten by the server within seconds, and with it what it holds.
+                // A client that was killed is dropped by the server within seconds, and with it what it holds.
                 Trouble::Held(why) if may_pass => {
                     tries += 1;
                     let why = why.in_language(Language::English);
@@ -227,7 +227,7 @@ impl PoseSequence<'_> {
         }
     }
 
-    /// Until somebody lets the simulation go on. One that is ended meanwhile is found out by what comes next.
+    /// Waits until the simulation is resumed. If it ends meanwhile, the next call notices.
     fn wait_out_pause(&mut self, what: &str) -> Result<(), Trouble> {
         tracing::warn!("on the way to {what}: the simulation is paused; this goes on when it does");
         while self.cell.is_paused() {
@@ -250,7 +250,7 @@ struct Passes<'a> {
     cancel: &'a CancelToken,
     began: Instant,
     images: &'a mut Images,
-    /// The arm has just come to rest, and the images of that pass are there.
+    /// The arm has just come to rest, and the images of that pass are available.
     has_come_to_rest: bool,
 }
 
@@ -272,7 +272,7 @@ impl capture::Images for Passes<'_> {
             }
             match self.cell.camera.newest(self.images.newest_s)? {
                 Newest::Frame(raw) => break raw,
-                // Time stands still, which the capture has to see.
+                // Time is paused, which the capture has to notice.
                 Newest::Same => self.images.newest_s = None,
                 Newest::Awaited => late.waits(Instant::now())?,
             }

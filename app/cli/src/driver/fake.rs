@@ -29,7 +29,7 @@ pub struct FakeArgs {
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_hyphen_values = true, help_heading = heading::CELL)]
     clock: f64,
     /// Listen at this address for one workbench after the other, in place of standard input and output; port 0 picks one that is
-    /// free. Whoever can connect can move the arm: there is no password.
+    /// free. Anyone who can connect can move the arm: there is no password.
     #[arg(long, value_name = "ADDR:PORT", help_heading = heading::ACCESS)]
     listen: Option<String>,
 }
@@ -82,7 +82,7 @@ fn listen(fake: &Fake, address: &str) -> Result<(), Failure> {
             .and_then(|()| stream.try_clone())
             .map_err(FakeError::Output)
             .and_then(|input| fake.converse(BufReader::new(input), &stream));
-        // A workbench that is gone is no reason to end; a cell that is gone is.
+        // Losing a workbench is no reason to end; losing the cell is.
         match served {
             Ok(()) | Err(FakeError::Output(_)) => {}
             Err(error) => return Err(Failure::failed(error)),

@@ -29,32 +29,32 @@ pub struct DriverArgs {
 
 #[derive(Debug, Subcommand)]
 enum DriverCommand {
-    /// Say whether a driver keeps to the protocol, and where it does not, with the line.
+    /// Check whether a driver follows the protocol; violations are listed with their line.
     #[command(after_help = EXAMPLES)]
     Test(test::TestArgs),
-    /// Be a driver with the built-in cell behind it, on standard input and output or over TCP.
+    /// Run a driver with the built-in cell behind it, on standard input and output or over TCP.
     #[command(after_help = "Examples:\n  handeye driver test \"handeye driver fake\" --allow-motion")]
     Fake(fake::FakeArgs),
     /// Write one of the drivers below as a Python file, to change it.
     #[command(after_help = "Examples:\n  handeye driver eject ur-rtde --out my_drivers")]
     Eject(EjectArgs),
-    /// Be a driver that reads a controller of Universal Robots through RTDE.
+    /// Run a driver that reads a controller of Universal Robots through RTDE.
     #[command(
         disable_help_flag = true,
         after_help = "Examples:\n  handeye driver test \"handeye driver ur-rtde --host 192.168.0.10 --arm ur5e\""
     )]
     UrRtde(PythonArgs),
-    /// Be a driver that reads ROS 1 or ROS 2 through a rosbridge.
+    /// Run a driver that reads ROS 1 or ROS 2 through a rosbridge.
     #[command(disable_help_flag = true, after_help = ROSBRIDGE_EXAMPLES)]
     Rosbridge(PythonArgs),
-    /// Be a driver that shows each image that comes into a folder, with its pose.
+    /// Run a driver that shows each image that comes into a folder, with its pose.
     #[command(
         disable_help_flag = true,
         after_help = "Examples:\n  handeye driver folder captures --length-unit mm --rotation rpy \\\n      --angle-unit deg \
                       --pose base_from_tip"
     )]
     Folder(PythonArgs),
-    /// Be a driver of a USB camera, or another one of Video4Linux.
+    /// Run a driver of a USB camera, or another one of Video4Linux.
     #[cfg(target_os = "linux")]
     #[command(
         disable_help_flag = true,

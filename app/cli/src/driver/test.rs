@@ -1,4 +1,4 @@
-//! `handeye driver test`: what a driver's author has to know.
+//! `handeye driver test`: for authors of drivers.
 
 use clap::Args;
 use handeye_driver::conformance::{self, ConformanceOptions};
@@ -26,12 +26,12 @@ pub struct TestArgs {
     json: Option<Output>,
 }
 
-/// Prints the report. Exit code 1 where a check failed, 2 where there is no driver to test.
+/// Prints the report. Exit code 1 if a check failed, 2 if there is no driver to test.
 pub fn run(args: &TestArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();
     let spec = spec(args).map_err(Failure::unusable)?;
     if let DriverSpec::Command(words) = &spec {
-        // Here, where its progress is seen: of a driver only what is wrong with it is printed.
+        // Here, where its progress is visible: of a driver's output only errors are printed.
         python::prepare(words)?;
     }
     let options = ConformanceOptions { allow_motion: args.allow_motion, ..ConformanceOptions::default() };

@@ -14,17 +14,18 @@ use handeye_session::{RESULT, Session};
 
 use crate::Failure;
 
-/// What a result says.
+/// The content of a result.
 pub struct Read {
-    /// What goes with the tip poses that the robot reports.
+    /// The calibration for the tip poses that the robot reports.
     pub calibrated: Predictor,
-    /// What goes with tip poses corrected for the errors of the arm, where correcting is expected to bring the tip nearer.
+    /// The calibration for tip poses corrected for the errors of the arm, if correcting is expected to bring the tip
+    /// nearer.
     pub corrected: Option<(Predictor, Arc<CorrectedArm>)>,
-    /// The board it was made with, where that is known.
+    /// The board it was made with, if that is known.
     pub target: Option<TargetSpec>,
 }
 
-/// Reads a result, or that of a session.
+/// Reads a result, or the result of a session.
 pub fn read(path: &Path) -> Result<Read, Failure> {
     let is_session = Session::is_session(path);
     let file = if is_session { path.join(RESULT) } else { path.to_path_buf() };

@@ -13,7 +13,7 @@ use crate::output::Output;
 use crate::{Failure, out};
 use handeye_workbench::model::Tracked;
 
-/// The document, or nothing where none is wanted.
+/// The document, or nothing if none is wanted.
 pub struct Document {
     open: Option<(Output, BufWriter<Box<dyn Write>>)>,
     written: u64,
@@ -45,7 +45,7 @@ impl Document {
         self.write(&format!("{comma}\n    {}", frame(tracked)))
     }
 
-    /// Whether nobody reads it any longer.
+    /// Whether its reader is gone.
     pub fn is_closed(&self) -> bool {
         self.is_closed
     }

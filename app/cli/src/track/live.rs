@@ -26,16 +26,16 @@ use handeye_workbench::session::start::REFERENCE_POSES;
 use handeye_workbench::text::Language;
 use handeye_workbench::worker::{FollowLine, TrackedBy, TrackedImage, Tracking};
 
-/// Rest between two looks at the clock of the cell.
+/// Pause between two looks at the clock of the cell.
 const LOOK: Duration = Duration::from_millis(2);
 
-/// A line of progress every so often \[s\].
+/// Interval of lines of progress \[s\].
 const PROGRESS_S: f64 = 2.0;
 
-/// The speed of the way to where there is room, as in the window.
+/// The speed of the move to where there is room, as in the window.
 const SHARE_OF_SPEED: f64 = 0.25;
 
-/// How long the board is looked for from where the arm stands, before the arm goes to where it should be in view.
+/// How long the board is searched for from the arm's position, before the arm goes to where it should be in view.
 const LOOKED_FOR: Duration = Duration::from_secs(2);
 
 /// What the arm does about the board.
@@ -48,7 +48,7 @@ pub enum Task {
     Reach {
         /// To this corner.
         index: usize,
-        /// So far off the board \[m\].
+        /// This far off the board \[m\].
         stand_off_m: f64,
     },
 }
@@ -60,9 +60,9 @@ const IMAGES_BEFORE_REACH: u64 = 15;
 pub struct Job<'a> {
     /// Where it is recorded.
     pub recorder: &'a Recorder,
-    /// What is tracked, and with what.
+    /// What is tracked, and the calibration used.
     pub by: TrackedBy,
-    /// The same by corrected tip poses, for the arm of the calibration.
+    /// The same with corrected tip poses, for the arm of the calibration.
     pub corrected: Option<TrackedBy>,
     /// What the arm does.
     pub task: Task,
@@ -70,19 +70,19 @@ pub struct Job<'a> {
     pub frames: Option<u64>,
     /// The cell belongs to this program: how its board moves.
     pub own_cell: Option<BoardMotion>,
-    /// Whether it is only said where the arm would be moved.
+    /// Whether the move of the arm is only printed.
     pub dry_run: bool,
 }
 
-/// Where it goes, image by image.
+/// Where the results go, image by image.
 pub struct Taken<'a> {
     /// The document.
     pub publish: &'a mut dyn FnMut(&Tracked) -> Result<(), Failure>,
-    /// Of what was done, also where it ends with an error.
+    /// The summary of the work so far, also if it ends with an error.
     pub summary: &'a mut Summary,
 }
 
-/// What came out of it.
+/// The results.
 #[derive(Debug, Default)]
 pub struct Summary {
     /// Whether tip poses are corrected for the errors of the arm.
@@ -95,12 +95,12 @@ pub struct Summary {
     rotation: Squares,
     follow_distance: Squares,
     follow_angle: Squares,
-    /// Images in which the arm did not go as its goal asked, because something was too near.
+    /// Images in which the arm did not go to its goal, because something was too close.
     kept_off: u64,
     follow_ended: Option<String>,
 }
 
-/// Root mean square of what comes in.
+/// Root mean square of its inputs.
 #[derive(Debug, Default)]
 struct Squares {
     sum: f64,
@@ -119,7 +119,7 @@ impl Squares {
 }
 
 impl Job<'_> {
-    /// By corrected tip poses where the arm of the calibration is the one that stands here.
+    /// With corrected tip poses if the arm of the calibration is the connected one.
     fn by_on(&self, cell: &mut OpenCell) -> Result<TrackedBy, Failure> {
         let Some(corrected) = &self.corrected else { return Ok(self.by.clone()) };
         let now = cell.robot_state()?;
@@ -135,8 +135,8 @@ impl Job<'_> {
     }
 }
 
-/// Tracks until there are images enough or it is cancelled. The arm is at rest when it returns. Following that ends for another
-/// reason is an error.
+/// Tracks until there are enough images or it is cancelled. The arm is at rest when it returns. If following ends for another
+/// reason, that is an error.
 pub fn run(cell: &mut OpenCell, job: &Job<'_>, cancel: &CancelToken, taken: &mut Taken<'_>) -> Result<(), Failure> {
     if let Some(board) = &job.own_cell {
         prepare_own_cell(cell, board, cancel)?;
@@ -146,7 +146,7 @@ pub fn run(cell: &mut OpenCell, job: &Job<'_>, cancel: &CancelToken, taken: &mut
         job.recorder.note(Entry::Step(Step::Track));
     }
     let line = Arc::new(FollowLine::default());
-    // It lives until the arm stands: an arm that follows looks at what is tracked.
+    // It lives until the arm is at rest: an arm that follows reads what is tracked.
     let by = job.by_on(cell)?;
     taken.summary.is_corrected = by.arm.is_some();
     let mut tracking = Tracking::new(by.clone(), Arc::clone(&line)).map_err(Failure::unusable)?;
@@ -190,7 +190,7 @@ fn follow_board(
     watched?;
     let end = followed?;
     let summary = &mut *watch.taken.summary;
-    // What ends in the very moment in which it was followed enough has done what it was asked to.
+    // If it ends at the very moment when enough images were followed, it has done what was requested.
     if watch.cancel.is_cancelled() || job.frames.is_some_and(|frames| summary.frames >= frames) {
         return Ok(());
     }
@@ -206,10 +206,10 @@ fn follow_board(
     Err(error)
 }
 
-/// Has the arm of the cell that this program started look at the board, and the board move.
+/// Makes the arm of the cell that this program started look at the board, and the board move.
 fn prepare_own_cell(cell: &mut OpenCell, board: &BoardMotion, cancel: &CancelToken) -> Result<(), Failure> {
     cell.set_going(false).map_err(|error| port_failure(&error))?;
-    // The reference poses are those of the UR5. Any other arm begins where its scene has it.
+    // The reference poses are those of the UR5. Any other arm starts where its scene has it.
     if cell.kinematics().is_some_and(ArmKinematics::is_ur5) {
         look_at_board(cell, cancel)?;
     }
@@ -230,7 +230,7 @@ fn look_at_board(cell: &mut OpenCell, cancel: &CancelToken) -> Result<(), Failur
     }
 }
 
-/// Whether the arm is there, and not stopped on its way.
+/// Whether the arm has arrived, and was not stopped before.
 fn moved(outcome: &Result<MotionOutcome, PortError>) -> Result<bool, Failure> {
     match outcome {
         Ok(MotionOutcome::Arrived) => Ok(true),
@@ -253,11 +253,11 @@ struct Watch<'a, 't> {
 }
 
 impl Watch<'_, '_> {
-    /// Until there are images enough, the arm stands or it is cancelled; the newest estimate.
+    /// Until there are enough images, the arm is at rest or it is cancelled; returns the newest estimate.
     fn run(&mut self, cell: &mut OpenCell, arm_stands: &dyn Fn() -> bool) -> Result<Option<Estimate>, Failure> {
         let Self { tracking, job, line, cancel, taken: Taken { publish, summary } } = self;
         let frames = match job.task {
-            // Of each place where the board is looked for.
+            // Counted for each place where the board is searched for.
             Task::Reach { .. } => Some(summary.frames + job.frames.unwrap_or(IMAGES_BEFORE_REACH)),
             Task::Watch | Task::Follow(_) => job.frames,
         };
@@ -325,10 +325,10 @@ impl Watch<'_, '_> {
     }
 }
 
-/// How long time has to stand still before it is asked why: more than an image takes on a slow machine.
+/// How long time has to be paused before the reason is queried: more than an image takes on a slow machine.
 const STANDS_STILL: Duration = Duration::from_secs(1);
 
-/// A simulation whose time stands still: said once, and waited for.
+/// A simulation whose time is paused: reported once, and waited for.
 #[derive(Default)]
 struct Pause {
     since: Option<Instant>,
@@ -382,8 +382,8 @@ fn is_seen_within(line: &FollowLine, end: &CancelToken, limit: Option<Duration>)
     line.is_seen()
 }
 
-/// Has a simulated arm that does not see the board go to where it should be in view, on ways that are known to be free, until
-/// it `is_seen`.
+/// Makes a simulated arm that does not see the board go to where it should be in view, on paths that are known to be free,
+/// until it `is_seen`.
 fn look_for_board(
     cell: &mut OpenCell,
     cancel: &CancelToken,
@@ -407,7 +407,7 @@ fn look_for_board(
 }
 
 impl Follower {
-    /// Follows until it is cancelled or following ends by itself; the arm is at rest then.
+    /// Follows until it is cancelled or following ends; the arm is at rest then.
     fn run(mut self) -> Result<FollowEnd, Failure> {
         // Nothing to follow before the board has been seen.
         is_seen_within(&self.line, &self.end, Some(LOOKED_FOR));
@@ -435,7 +435,7 @@ impl Follower {
     }
 }
 
-/// Moves the tip once to where a corner is by the newest estimate, or says where that is.
+/// Moves the tip once to a corner according to the newest estimate, or prints where that is.
 fn reach(
     cell: &mut OpenCell,
     job: &Job<'_>,
@@ -519,7 +519,7 @@ impl Summary {
         self.frames == 0
     }
 
-    /// For programs.
+    /// As JSON.
     pub fn json(&self) -> Value {
         json!({
             "frames": self.frames,
@@ -536,7 +536,7 @@ impl Summary {
         })
     }
 
-    /// For people.
+    /// As text.
     pub fn text(&self) -> String {
         if self.is_empty() {
             return "no image came: nothing was tracked\n".to_owned();

@@ -1,4 +1,4 @@
-//! `handeye track`: tracks the board live, and has the arm follow it.
+//! `handeye track`: tracks the board live, and makes the arm follow it.
 
 mod calibration;
 mod document;
@@ -58,20 +58,20 @@ pub struct TrackArgs {
     /// Without it they are corrected, and so is what the arm is sent, where that brings the tip nearer.
     #[arg(long, help_heading = heading::FOLLOWING)]
     as_reported: bool,
-    /// End after so many images; without it, at Ctrl-C.
+    /// End after this many images; without it, at Ctrl-C.
     #[arg(long, value_name = "N", help_heading = heading::TRACKING)]
     frames: Option<u64>,
     /// Write every pose and a summary as JSON to this file; `-` for standard output instead of the summary.
     #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     json: Option<Output>,
-    /// The chessboard, if the calibration does not say it: inner corners along x and y, and the square.
+    /// The chessboard, if the calibration does not contain it: inner corners along x and y, and the square.
     #[arg(long, value_name = "COLUMNSxROWSxMM", help_heading = heading::TRACKING)]
     target: Option<String>,
-    /// How the built-in cell moves its board: still, circle, figure_eight, random_walk or step; a circle if neither this
-    /// nor the scene says it.
+    /// How the built-in cell moves its board: still, circle, figure_eight, random_walk or step; a circle if neither this nor the
+    /// scene states it.
     #[arg(long, value_name = "PATH", conflicts_with_all = ["connect", "driver"], help_heading = heading::BOARD)]
     board_path: Option<BoardPath>,
-    /// How fast, metres per second; as the scene says if not given.
+    /// How fast, metres per second; from the scene if not given.
     #[arg(long, value_name = "SPEED", conflicts_with_all = ["connect", "driver"], help_heading = heading::BOARD)]
     board_speed: Option<f64>,
     #[command(flatten)]
@@ -122,7 +122,7 @@ pub fn run(args: &TrackArgs) -> Result<(), Failure> {
         )));
     }
     let recorder = rerun_arg::start(&args.rerun, RerunChoice::Off, Pace::Live, false)?;
-    // Who only watches gets what goes with commands as they are.
+    // If it only watches, it uses the calibration for uncorrected commands.
     let corrects = !matches!(task, Task::Watch) && !args.as_reported;
     let by = |calibrated, arm| TrackedBy { setup: Setup { target, calibrated, motion: MotionModel::default() }, arm };
     let job = Job {
@@ -131,7 +131,7 @@ pub fn run(args: &TrackArgs) -> Result<(), Failure> {
         corrected: corrected.filter(|_| corrects).map(|(calibrated, arm)| by(calibrated, Some(arm))),
         task,
         frames: args.frames,
-        // The board of somebody else's cell is not ours to move, nor is the arm before it follows.
+        // The board of an existing cell must not be moved here, nor the arm before it follows.
         own_cell: (!args.cell.is_given()).then_some(board),
         dry_run: args.cell.dry_run,
     };
@@ -156,7 +156,7 @@ pub fn run(args: &TrackArgs) -> Result<(), Failure> {
         }
         tracked
     });
-    // What was tracked before an error is as good as the rest.
+    // What was tracked before an error is valid.
     document.finish(&summary, tracked.as_ref().err())?;
     let is_worth_saying = tracked.is_ok() || !summary.is_empty();
     if is_worth_saying && !args.json.as_ref().is_some_and(Output::is_standard) {

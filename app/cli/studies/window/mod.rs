@@ -1,5 +1,5 @@
-//! The window drawn as on a screen of 60 Hz, without a graphics card: events, panes, tessellation, and how long each frame takes
-//! the thread that draws, on the clock, what other threads take of the processor included.
+//! The window drawn as on a screen of 60 Hz, without a graphics card: events, panes, tessellation, and the wall time of each
+//! frame on the drawing thread, including processor time taken by other threads.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use handeye_workbench::worker::{Clock, Waker};
 /// Refresh of a usual screen.
 const PERIOD: Duration = Duration::from_micros(16_667);
 
-/// A window on a session of its own, which goes with it.
+/// A window on a session of its own, which is deleted with it.
 pub struct Drawn {
     window: Window,
     ctx: egui::Context,
@@ -55,7 +55,7 @@ impl Drawn {
         Ok(Self { window, ctx, began, sessions, times_ms: Vec::new(), shapes: 0 })
     }
 
-    /// What is behind it.
+    /// The application behind it.
     pub fn app(&mut self) -> &mut App {
         self.window.app_mut()
     }
@@ -76,7 +76,7 @@ impl Drawn {
         self.window.collect(&self.ctx);
         let window = &mut self.window;
         let mut output = self.ctx.run_ui(input, |ui| window.window_ui(ui));
-        // There is no graphics card that wants them.
+        // There is no graphics card that needs them.
         output.textures_delta.clear();
         self.shapes = output.shapes.len();
         std::hint::black_box(self.ctx.tessellate(output.shapes, output.pixels_per_point).len());

@@ -8,7 +8,7 @@ use super::paths;
 use super::pen::Pen;
 use super::style;
 
-/// Writes those that the cell says stand around and those of a person, in place of earlier ones.
+/// Writes the obstacles that the cell reports and the boxes of the user, replacing earlier ones.
 pub(super) fn write(pen: Pen<'_>, scene_obstacles: &Surroundings, own: &Surroundings) -> Result<(), RecordError> {
     pen.write(paths::STANDING, &boxes(&scene_obstacles.obstacles).with_colors([style::STANDING]))?;
     let names = own.obstacles.iter().map(|obstacle| obstacle.name.as_str());

@@ -1,4 +1,4 @@
-//! The live camera: where it is, what it sees, and the depths of that as points in the base.
+//! The live camera: where it is, its images, and their depths as points in the base.
 
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::depth::{DepthImage, DepthSample};
@@ -17,9 +17,9 @@ use super::style;
 use handeye_workbench::jpeg::{self, ColorType};
 use handeye_workbench::scene::Known;
 
-/// No loss that an eye sees, at a tenth of the bytes.
+/// No visible loss, at a tenth of the bytes.
 const JPEG_QUALITY: u8 = 80;
-/// Every so many pixels along rows and columns are a point in the base.
+/// One pixel in this many along rows and columns becomes a point in the base.
 const POINT_STEP: usize = 8;
 /// Depths are kept in steps of a tenth of a millimetre while they fit into 16 bits, and of a millimetre beyond.
 const FINE_STEPS_PER_METRE: f32 = 10_000.0;
@@ -51,7 +51,7 @@ pub(super) fn write_depth(
     (depth, rgb): (&DepthImage, &RgbImage),
     far_plane_m: Option<f32>,
 ) -> Result<(), RecordError> {
-    // Of a recorded image whose sensor is not known, its largest depth: nothing lies behind.
+    // For a recorded image whose sensor is not known, its largest depth: nothing is behind it.
     let far_m =
         far_plane_m.unwrap_or_else(|| depth.metres.iter().copied().filter(|m| m.is_finite()).fold(0.0, f32::max));
     let path = below(&lens(known), paths::DEPTH);
@@ -102,7 +102,7 @@ fn points_in_base(
     let (mut points, mut colours) = (Vec::new(), Vec::new());
     for row in (0..depth.height).step_by(POINT_STEP) {
         for column in (0..depth.width).step_by(POINT_STEP) {
-            // An image of another size than the lens, or a pixel beyond its model, has no points.
+            // An image of a different size than the lens, or a pixel outside its model, has no points.
             let Ok(Some(in_camera)) = depth.point(column, row, far_m, intrinsics) else { continue };
             points.push(point(&(*base_from_camera * in_camera).point()));
             let colour = rgb.get_pixel_checked(column, row).map_or([160; 3], |pixel| pixel.0);
@@ -127,7 +127,7 @@ pub(super) fn projected(
     pixels.filter(inside).collect()
 }
 
-/// Where the calibration puts the corners in the live image.
+/// Where the calibration predicts the corners in the live image.
 pub(super) fn write_prediction(
     pen: Pen<'_>,
     known: &Known,

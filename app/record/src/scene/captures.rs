@@ -1,4 +1,4 @@
-//! The captures: each a camera where it stood, with its image, the corners in it and what the calibration makes of them.
+//! The captures: each a camera where it was, with its image, the corners in it and its result in the calibration.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -36,11 +36,11 @@ pub(super) struct Shown {
 /// All captures.
 #[derive(Debug, Default)]
 pub(super) struct Captures {
-    /// The document, with its folder where there is one.
+    /// The document, with its folder if there is one.
     document: Option<Arc<Document>>,
     folder: Option<PathBuf>,
     shown: BTreeMap<CaptureId, Shown>,
-    /// Deleted, and perhaps to come back.
+    /// Deleted, but may come back.
     deleted: BTreeMap<CaptureId, Shown>,
     selected: Vec<CaptureId>,
 }
@@ -88,14 +88,14 @@ impl Captures {
                 }
                 continue;
             }
-            // One that comes back counts too: a viewer puts what was cleared at the same time at the origin.
+            // One that comes back counts too: a viewer shows what was cleared at the same time at the origin.
             clock.captures += 1;
             let before = self.deleted.remove(&record.id);
             let own = record.sim_time_s.map_or(clock.sim_time_s, |time| time.max(0.0));
             if !clock.is_live {
                 clock.sim_time_s = clock.sim_time_s.max(own);
             }
-            // What was cleared since it was taken, and what comes from elsewhere, is there from now on.
+            // What was cleared since it was taken, and what comes from another session, exists from now on.
             let time = if before.is_some() || is_other {
                 clock.sim_time_s
             } else if is_first {
@@ -120,7 +120,7 @@ impl Captures {
         Some(shown)
     }
 
-    /// Takes over the selection and says what is drawn in another way now.
+    /// Takes over the selection and returns what is drawn differently now.
     pub fn select(&mut self, ids: &[CaptureId]) -> Vec<CaptureId> {
         let before = std::mem::replace(&mut self.selected, ids.to_vec());
         let differs = |id: &&CaptureId| before.contains(id) != self.selected.contains(id);
@@ -153,7 +153,7 @@ impl Captures {
         Ok(Some((depth, rgb)))
     }
 
-    /// Where a capture was taken, coloured by what is known of it.
+    /// Where a capture was taken, coloured by what is known about it.
     pub fn write_place(&self, pen: Pen<'_>, known: &Known, shown: &Shown) -> Result<(), RecordError> {
         let record = &shown.record;
         let item = scene::Captures::new(known).item(record);
@@ -172,7 +172,7 @@ impl Captures {
         pen.write(&below(&path, paths::LENS), &pinhole(&intrinsics, style::CAPTURE_IMAGE_PLANE, colour, line))
     }
 
-    /// All that is in the image of a capture, below a lens or another place of images.
+    /// Everything in the image of a capture, below a lens or another place of images.
     pub fn write_marks(pen: Pen<'_>, known: &Known, shown: &Shown, below_path: &str) -> Result<(), RecordError> {
         let outcome = known.solved.as_deref().and_then(|solved| outcome(solved, shown.record.id));
         let residuals = outcome.map_or(&[][..], |outcome| outcome.residuals);
@@ -188,7 +188,7 @@ impl Captures {
         pen.write(&below(below_path, paths::RESIDUALS), &arrows)
     }
 
-    /// The board as the image of a capture has it, and as the calibration does.
+    /// The board as seen in the image of a capture, and as calibrated.
     pub fn write_boards(pen: Pen<'_>, known: &Known, shown: &Shown) -> Result<(), RecordError> {
         let path = paths::capture(shown.record.id);
         if known.mount().is_none() {
@@ -225,7 +225,7 @@ impl Captures {
 
 fn seen(known: &Known, corners: Option<&[Corner]>) -> Option<Pose<Camera, Target>> {
     let (target, intrinsics): (TargetSpec, Intrinsics) = (known.target?, known.intrinsics()?);
-    // Corners that no pose explains have none; the table of captures says so too.
+    // Corners that no pose explains have none; the table of captures shows that too.
     planar_pose::camera_from_target(corners?, &target, &intrinsics).ok()
 }
 
@@ -240,7 +240,7 @@ fn colour(item: &CaptureItem) -> Color {
     }
 }
 
-/// Its number, and that it was left out as an outlier where it was.
+/// Its number, and that it was excluded as an outlier if it was.
 fn label(id: CaptureId, used_as: CaptureUse) -> String {
     if used_as == CaptureUse::Rejected { format!("{id} (outlier)") } else { id.to_string() }
 }

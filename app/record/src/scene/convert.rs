@@ -1,4 +1,4 @@
-//! From our numbers to those of Rerun.
+//! From our conventions to those of Rerun.
 
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::targets::TargetSpec;
@@ -44,18 +44,18 @@ pub(super) fn axes(length: f32) -> TransformAxes3D {
     TransformAxes3D::new(length)
 }
 
-/// In the place of axes that are there no more. [`rerun::Clear`] is for what never comes back: a viewer of version 0.36
-/// puts an entity at the origin that has a new transform at the very time at which it was cleared.
+/// Replaces axes that no longer exist. [`rerun::Clear`] is for what never comes back: a viewer of version 0.36 puts an
+/// entity at the origin that has a new transform at the very time at which it was cleared.
 pub(super) fn no_axes() -> TransformAxes3D {
     TransformAxes3D::new(0.0)
 }
 
-/// In the place of lines that are there no more, see [`no_axes`].
+/// Replaces lines that no longer exist, see [`no_axes`].
 pub(super) fn no_lines() -> LineStrips3D {
     LineStrips3D::new(Vec::<Vec<[f32; 3]>>::new())
 }
 
-/// A projection. Rerun knows no distortion; `result` has it.
+/// A projection. Rerun does not support distortion; `result` has it.
 pub(super) fn pinhole(intrinsics: &Intrinsics, image_plane_m: f32, colour: Color, line_ui_points: f32) -> Pinhole {
     let [fx, fy] = [intrinsics.fx, intrinsics.fy].map(|v| v as f32);
     let [cx, cy] = [intrinsics.cx, intrinsics.cy].map(|v| (v + PIXEL_SHIFT) as f32);
@@ -67,7 +67,7 @@ pub(super) fn pinhole(intrinsics: &Intrinsics, image_plane_m: f32, colour: Color
         .with_line_width(Radius::new_ui_points(line_ui_points))
 }
 
-/// Marks in an image; none clears those that were there.
+/// Marks in an image; an empty set clears the earlier ones.
 pub(super) fn marks(pixels: impl IntoIterator<Item = Vector2<f64>>, colour: Color) -> Points2D {
     let pixels: Vec<[f32; 2]> = pixels.into_iter().map(|px| pixel(&px)).collect();
     Points2D::new(pixels).with_colors([colour]).with_radii([Radius::new_ui_points(style::CORNER_UI_POINTS)])

@@ -13,7 +13,7 @@ pub enum RecordError {
     Stream {
         /// Which entity.
         path: String,
-        /// What the stream said.
+        /// The stream's error.
         source: Box<rerun::RecordingStreamError>,
     },
     /// A file of a capture cannot be read; everything else of the entry is recorded.
@@ -36,12 +36,12 @@ pub enum RecordError {
         width: u32,
         /// Height in pixels.
         height: u32,
-        /// What the encoder said.
+        /// The encoder's message.
         reason: String,
     },
 }
 
-/// Goes on after what concerns one thing only, and keeps the first of such errors.
+/// Continues after errors that concern one thing only, and keeps the first of them.
 #[derive(Debug, Default)]
 pub(super) struct Faults(Option<RecordError>);
 

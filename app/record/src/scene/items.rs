@@ -7,7 +7,7 @@ use super::pen::Pen;
 use super::style;
 use handeye_workbench::scene::{BoardItem, CameraItem, Known, Role};
 
-/// A camera with its lens. Without a place there is no lens either, or images would hang in the base.
+/// A camera with its lens. Without a place there is no lens either, or images would appear in the base.
 pub(super) fn write_camera(pen: Pen<'_>, known: &Known, camera: Option<CameraItem>) -> Result<(), RecordError> {
     let Some(CameraItem { role, place, shape }) = camera else { return Ok(()) };
     let path = if role == Role::True { paths::TRUE_CAMERA } else { paths::camera(known.mode()) };

@@ -13,7 +13,7 @@
 //! | `result` | the board as calibrated, uncertainties, numbers, report |
 //! | `track` | the board as it is tracked |
 //!
-//! What happens between captures has no time on the time line `capture`; there robot and camera are as they were when
+//! What happens between captures has no time on the time line `capture`; on it robot and camera are as they were when
 //! the capture was taken, so that stepping through it shows one capture after the other.
 
 mod boxes;
@@ -55,7 +55,7 @@ use pen::{Clock, Instant, Pen};
 use planned::Planned;
 use robot::Trail;
 
-/// Depths and points of live images are recorded once in this time [s, simulated]: they are ten times the size of the
+/// Interval at which depths and points of live images are recorded [s, simulated]: they are ten times the size of the
 /// image, and what they show changes slowly.
 const DEPTH_EVERY_S: f64 = 1.0;
 
@@ -79,7 +79,7 @@ pub struct SceneWriter {
     /// Number and time \[s\] of the newest image.
     newest_image: Option<(u64, f64)>,
     depth_at_s: Option<f64>,
-    /// The far plane of the depth sensor \[m\], once an image says.
+    /// The far plane of the depth sensor \[m\], once known from an image.
     far_plane_m: Option<f32>,
 }
 
@@ -90,7 +90,7 @@ impl Default for SceneWriter {
 }
 
 impl SceneWriter {
-    /// For a recording in which there is nothing yet.
+    /// For an empty recording.
     pub fn new() -> Self {
         Self {
             clock: Clock::default(),
@@ -109,7 +109,7 @@ impl SceneWriter {
         }
     }
 
-    /// What is there at all times: axes of the world, names of series. Once per recording, before anything else.
+    /// What exists at all times: axes of the world, names of series. Once per recording, before anything else.
     ///
     /// # Errors
     /// [`RecordError::Stream`].
@@ -123,8 +123,8 @@ impl SceneWriter {
         Ok(())
     }
 
-    /// Writes what an entry says, on the time lines of [`paths`]. The stream may be another one from call to call, as
-    /// long as all of them are of one recording.
+    /// Writes the content of an entry, on the time lines of [`paths`]. The stream may differ from call to call, as long
+    /// as all of them belong to one recording.
     ///
     /// # Errors
     /// [`RecordError::Stream`] when the recording takes nothing more. Other errors concern one image or document, and
@@ -158,7 +158,7 @@ impl SceneWriter {
                 boxes::write(pen, scene_obstacles, own)
             }
             Entry::Selected(ids) => self.selected(pen, ids),
-            // The arrangement of the viewer is no part of the scene, see `blueprint`.
+            // The arrangement of the viewer is not part of the scene, see `blueprint`.
             Entry::Step(_) => Ok(()),
             Entry::Message { severity, words } => {
                 pen.at(self.clock.now());
@@ -172,7 +172,7 @@ impl SceneWriter {
         }
     }
 
-    /// What of it there is to show in a step.
+    /// What there is to show in a step.
     pub fn arranged(&self, step: Step) -> Arranged {
         let has_joints = self.known.cell.as_ref().is_none_or(|cell| !cell.joints.is_empty());
         Arranged { step, is_beside: self.known.mode() == Mode::EyeToHand, has_joints }
@@ -180,7 +180,7 @@ impl SceneWriter {
 
     /// How much room all of it takes; `None` before it is known where anything is.
     pub fn extent(&self) -> Option<Extent> {
-        // The tip of the cell before is not where the arm of this one is.
+        // The tip of the previous cell is not where the arm of this one is.
         let is_known = self.known.cell.is_none() || self.is_placed;
         is_known.then(|| Extent::of(&self.known, self.arm.as_ref(), self.captures.tips())).flatten()
     }
@@ -204,7 +204,7 @@ impl SceneWriter {
         if self.known.base_from_tip.is_some() { self.truth(pen) } else { Ok(()) }
     }
 
-    /// Camera and board where they truly are; nothing where the cell does not say.
+    /// Camera and board where they truly are; nothing if the cell does not report it.
     fn truth(&self, pen: Pen<'_>) -> Result<(), RecordError> {
         write_camera(pen, &self.known, self.known.true_camera())?;
         write_board(pen, &self.known, self.known.true_board())
@@ -221,7 +221,7 @@ impl SceneWriter {
         pen.at(self.clock.live());
         self.tip(pen, base_from_tip, Some(joints))?;
         self.joints(pen, joints)?;
-        // The way is one line on every time line.
+        // The trail is one line on every time line.
         pen.at(self.clock.now());
         self.trails(pen, base_from_tip)
     }
@@ -246,7 +246,7 @@ impl SceneWriter {
         if is_first {
             self.truth(pen)
         } else {
-            // Its lens stays as it is.
+            // Its lens is unchanged.
             let camera = self.known.true_camera();
             write_camera(pen, &self.known, camera.map(|camera| CameraItem { shape: None, ..camera }))
         }
@@ -281,7 +281,7 @@ impl SceneWriter {
         let Some(base_from_tip) = &info.base_from_tip else { return faults.finish() };
         camera::write_prediction(pen, &self.known, base_from_tip)?;
         let age_s = self.depth_at_s.map(|at| self.clock.sim_time_s - at);
-        // A negative age is a simulation that was started again.
+        // A negative age means that the simulation was restarted.
         if age_s.is_none_or(|age| !(0.0..DEPTH_EVERY_S).contains(&age)) {
             self.depth_at_s = Some(self.clock.sim_time_s);
             if let Some(depth) = &images.depth {
@@ -375,7 +375,7 @@ impl SceneWriter {
         pen.at(taken);
         if let Some(shown) = self.captures.get(id) {
             self.captures.write_place(pen, &self.known, shown)?;
-            // Those of one that comes back are known already.
+            // The corners of one that comes back are known already.
             if shown.corners.is_some() {
                 Captures::write_marks(pen, &self.known, shown, &below(&paths::capture(id), paths::LENS))?;
                 Captures::write_boards(pen, &self.known, shown)?;

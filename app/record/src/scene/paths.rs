@@ -13,31 +13,31 @@ pub const SIM_TIMELINE: &str = "sim_time";
 
 /// The robot's base: the world.
 pub const BASE: &str = "base";
-/// Where the arm stands, `base_from_arm`; its links are below, see [`link`].
+/// Where the arm's foot is, `base_from_arm`; its links are below, see [`link`].
 pub const ARM: &str = "base/arm";
 /// The tip as the controller reports it, `base_from_tip`.
 pub const TIP: &str = "base/tip";
-/// The way of the tip since the recording began, in blocks.
+/// The trail of the tip since the recording began, in blocks.
 pub const TRAJECTORY_SESSION: &str = "base/trajectory/session";
-/// The way of the tip since the cell was connected, in blocks.
+/// The trail of the tip since the cell was connected, in blocks.
 pub const TRAJECTORY_CONNECTION: &str = "base/trajectory/since_connect";
 /// Points that the newest depth image sees, in the base.
 pub const POINTS: &str = "base/points";
 /// The captures, one entity each, see [`capture`].
 pub const CAPTURES: &str = "base/captures";
-/// Where guided capture goes next: the camera on the tip, or the board on it.
+/// Where guided capture moves next: the camera on the tip, or the board on it.
 pub const PLANNED: &str = "base/planned";
-/// Boxes about the shapes that the cell says stand around.
+/// Boxes around the obstacles that the cell reports.
 pub const STANDING: &str = "base/around/scene";
-/// Boxes that a person keeps the arm out of.
+/// Boxes that the user keeps the arm out of.
 pub const KEEP_OUT: &str = "base/around/keep_out";
 /// The board as it is tracked, `base_from_target`.
 pub const TRACKED_BOARD: &str = "base/track/board";
-/// The board by the newest image alone.
+/// The board from the newest image alone.
 pub const TRACKED_BY_PNP: &str = "base/track/by_pnp";
-/// The board by the newest depths alone.
+/// The board from the newest depths alone.
 pub const TRACKED_BY_DEPTH: &str = "base/track/by_depth";
-/// The first corner by its own depth alone, a point in the base.
+/// The first corner from its own depth alone, a point in the base.
 pub const TRACKED_FIRST_CORNER: &str = "base/track/first_corner_by_depth";
 
 /// What a simulated cell publishes about itself.
@@ -64,11 +64,11 @@ pub const PLOT_JOINTS: &str = "plots/joints";
 pub const PLOT_LATENCY: &str = "plots/track/latency";
 /// Time that the search for the board took \[ms\].
 pub const PLOT_SEARCH: &str = "plots/live/search";
-/// Tracked board against its true position \[mm\].
+/// Tracked board compared with its true position \[mm\].
 pub const PLOT_TRACK_ERROR: &str = "plots/track/error";
-/// Tracked board against its true orientation \[deg\].
+/// Tracked board compared with its true orientation \[deg\].
 pub const PLOT_TRACK_TURN: &str = "plots/track/turn_error";
-/// What the tracker states for its position, 95 % \[mm\].
+/// The uncertainty that the tracker states for its position, 95 % \[mm\].
 pub const PLOT_TRACK_SIGMA: &str = "plots/track/stated_95";
 /// Tracked poses per second.
 pub const PLOT_TRACK_RATE: &str = "plots/track/rate";
@@ -77,9 +77,9 @@ pub const PLOT_TRACK_SPEED: &str = "plots/track/speed";
 
 /// What was reported, with its severity.
 pub const LOG: &str = "log";
-/// The result for people, Markdown.
+/// The result as a report, Markdown.
 pub const REPORT: &str = "report";
-/// The result to the last digit: the text of `result.json`.
+/// The result with all digits: the text of `result.json`.
 pub const RESULT: &str = "result";
 
 /// Below a camera: its projection, with everything that is in pixels below it.
@@ -90,22 +90,22 @@ pub const IMAGE: &str = "image";
 pub const DEPTH: &str = "depth";
 /// Below a lens: the corners that were found.
 pub const CORNERS: &str = "corners";
-/// Below a lens: where the calibration puts the corners.
+/// Below a lens: where the calibration predicts the corners.
 pub const PREDICTED: &str = "predicted";
 /// Below a lens: from prediction to corner, made longer by [`super::style::RESIDUAL_FACTOR`].
 pub const RESIDUALS: &str = "residuals_x50";
 /// Below a camera: the board in its image alone, `camera_from_target` by PnP.
 pub const SEEN_BOARD: &str = "seen_board";
-/// Below a camera: the board where the calibration puts it, `camera_from_target`.
+/// Below a camera: where the calibration predicts the board, `camera_from_target`.
 pub const PREDICTED_BOARD: &str = "predicted_board";
-/// Below a camera or a board: where it may be with 95 %, larger by [`super::style::UNCERTAINTY_FACTOR`].
+/// Below a camera or a board: its 95 % region, enlarged by [`super::style::UNCERTAINTY_FACTOR`].
 pub const UNCERTAINTY: &str = "uncertainty_95_x100";
-/// Below the tracked board: where it may be with 95 %, larger by [`super::style::TRACK_UNCERTAINTY_FACTOR`].
+/// Below the tracked board: its 95 % region, enlarged by [`super::style::TRACK_UNCERTAINTY_FACTOR`].
 pub const TRACK_UNCERTAINTY: &str = "uncertainty_95_x10";
 /// Below a board: its outer edge.
 pub const OUTLINE: &str = "outline";
 
-/// The camera: on the tip (`tip_from_camera`) or beside the robot (`base_from_camera`).
+/// The camera: on the tip (`tip_from_camera`) or next to the robot (eye to hand, `base_from_camera`).
 pub fn camera(mode: Mode) -> &'static str {
     match mode {
         Mode::EyeInHand => "base/tip/camera",
@@ -121,7 +121,7 @@ pub fn board(mode: Mode) -> &'static str {
     }
 }
 
-/// What link `index` of the arm has moved since all joints were zero; 0 is the foot.
+/// How link `index` of the arm has moved relative to all joints at zero; 0 is the foot.
 pub fn link(index: usize) -> String {
     format!("{ARM}/link_{index}")
 }

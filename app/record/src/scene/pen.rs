@@ -1,4 +1,4 @@
-//! Writes archetypes at a time.
+//! Writes archetypes at a given time.
 
 use handeye_geometry::frames::Pose;
 use nalgebra::Isometry3;
@@ -8,16 +8,16 @@ use super::convert::{axes, no_axes, transform};
 use super::error::RecordError;
 use super::paths;
 
-/// When something is.
+/// The time of something.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Instant {
     /// Number of the newest capture; `None` for what happens between captures.
     pub capture: Option<i64>,
-    /// Simulated time \[s\]; `None` for what is of another simulation than what is seen live.
+    /// Simulated time \[s\]; `None` for what belongs to another simulation than the live one.
     pub sim_time_s: Option<f64>,
 }
 
-/// The times that entries without one of their own get.
+/// The times for entries without one of their own.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Clock {
     /// Captures so far.
@@ -56,7 +56,7 @@ pub(super) struct Pen<'a> {
 
 impl<'a> Pen<'a> {
     pub fn new(rec: &'a RecordingStream) -> Self {
-        // Time lines are those of `paths` and the wall time; a count of calls says nothing.
+        // Time lines are those of `paths` and the wall time; a count of calls is not useful.
         rec.set_log_tick_enabled(false);
         Self { rec }
     }
@@ -88,7 +88,7 @@ impl<'a> Pen<'a> {
         self.write(path, &[&transform(parent_from_it) as &dyn AsComponents, &axes(axes_m)])
     }
 
-    /// The same of a frame that comes and goes.
+    /// The same for a frame that comes and goes.
     pub fn frame_if<Dst, Src>(
         self,
         path: &str,
@@ -101,7 +101,7 @@ impl<'a> Pen<'a> {
         }
     }
 
-    /// From the present time on there is nothing there and below.
+    /// From the present time on nothing exists there and below.
     pub fn clear(self, path: &str) -> Result<(), RecordError> {
         self.write(path, &rerun::Clear::recursive())
     }

@@ -1,4 +1,5 @@
-//! Poses that guided capture goes to: a frustum where the camera will be, or an outline where the board on the tip will be.
+//! Poses that guided capture moves to: a frustum where the camera will be, or an outline where the board on the tip will
+//! be.
 
 use handeye_geometry::frames::{Base, Pose, Tip};
 use nalgebra::Isometry3;
@@ -11,7 +12,7 @@ use super::pen::Pen;
 use super::style;
 use handeye_workbench::scene::{Known, PlannedItem, frustum_end};
 
-/// Keeps how many are written, so that those that are no longer planned go.
+/// Keeps how many are written, so that those that are no longer planned are removed.
 #[derive(Debug, Default)]
 pub(super) struct Planned {
     written: usize,
@@ -34,7 +35,7 @@ impl Planned {
     }
 }
 
-/// What will be there, in its own frame; `None` where it is not known where on the tip it is.
+/// What will be there, in its own frame; `None` if its mounting on the tip is not known.
 fn shape(known: &Known, base_from_tip: &Pose<Base, Tip>) -> Option<(Isometry3<f64>, LineStrips3D)> {
     Some(match known.planned(base_from_tip)? {
         PlannedItem::Board(base_from_target, target) => {

@@ -40,7 +40,7 @@ pub(super) fn named(name: &str) -> SeriesLines {
     SeriesLines::new().with_names([name])
 }
 
-/// The calibration that `known` has just learnt.
+/// The calibration that was just added to `known`.
 pub(super) fn write(pen: Pen<'_>, known: &Known, solved: &Solved) -> Result<(), RecordError> {
     let calibration = &solved.calibration;
     let links = calibration.link_covariances();
@@ -64,7 +64,7 @@ pub(super) fn write(pen: Pen<'_>, known: &Known, solved: &Solved) -> Result<(), 
     pen.write(paths::RESULT, &TextDocument::new(json))
 }
 
-/// Where a camera or a board may be.
+/// The region in which a camera or a board may be.
 fn write_uncertainty(pen: Pen<'_>, path: &str, covariance: Option<&Matrix6<f64>>) -> Result<(), RecordError> {
     let path = below(path, paths::UNCERTAINTY);
     match covariance {

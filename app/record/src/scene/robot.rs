@@ -1,4 +1,4 @@
-//! The arm, its joints, and the way that the tip went.
+//! The arm, its joints, and the trail of the tip.
 
 use handeye_arm::JointKind;
 use handeye_cell::render::{Shape, Solid};
@@ -11,13 +11,13 @@ use super::pen::Pen;
 use super::{paths, style};
 use handeye_workbench::scene::PosedArm;
 
-/// Where the arm stands and how its links have moved.
+/// Where the arm's foot is and how its links have moved.
 pub(super) fn write_arm(pen: Pen<'_>, arm: &PosedArm) -> Result<(), RecordError> {
     pen.write(paths::ARM, &transform(&arm.base_from_arm))?;
     arm.links.iter().enumerate().try_for_each(|(link, moved)| pen.write(&paths::link(link), &transform(moved)))
 }
 
-/// The solids of each link with all joints zero, in place of those that are written already.
+/// The solids of each link with all joints zero, replacing those that are written already.
 pub(super) fn write_solids(
     pen: Pen<'_>,
     bodies: &[(usize, Solid)],
@@ -37,7 +37,7 @@ pub(super) fn write_solids(
                     let ends = [a, b].map(|end| point(&(solid.world_from_shape * end)));
                     capsules.push((solid, ends, radius as f32));
                 }
-                // The arm has no other shapes; the image of one that got some would lack them.
+                // The arm has no other shapes; the image of one that had some would lack them.
                 Shape::Sphere { .. } | Shape::Box { .. } | Shape::Plane => {}
             }
         }
@@ -71,7 +71,7 @@ fn colour(solid: &Solid) -> Color {
     Color::from_rgb(red, green, blue)
 }
 
-/// The joint values as numbers, and names for the joints in the plot where `named` are others.
+/// The joint values as numbers, and names for the joints in the plot if they differ from `named`.
 pub(super) fn write_joints(
     pen: Pen<'_>,
     joints: &[f64],
@@ -106,9 +106,9 @@ pub(super) struct Trail {
 }
 
 impl Trail {
-    /// Points closer together than this \[m\] are one: thinner than the line on the screen.
+    /// Points closer together than this \[m\] are merged: the distance is less than the line width on the screen.
     const SPACING_M: f64 = 2e-3;
-    /// A tip that jumps farther \[m\] was not seen meanwhile, and there is no line.
+    /// A tip that jumps farther \[m\] was not seen in between, and there is no line.
     const JUMP_M: f64 = 0.3;
     /// Points of a block.
     const BLOCK: usize = 100;
@@ -117,7 +117,7 @@ impl Trail {
         Self { path, colour, blocks: 0, newest: Vec::new() }
     }
 
-    /// Begins again.
+    /// Starts again.
     pub fn restart(&mut self, pen: Pen<'_>) -> Result<(), RecordError> {
         if self.newest.is_empty() {
             return Ok(());

@@ -23,7 +23,7 @@ struct Entity {
 
 type Entities = BTreeMap<String, Entity>;
 
-/// A writer at work, and what it has written since it was last asked.
+/// A writer at work, and what it has written since the last call.
 struct Bench {
     writer: SceneWriter,
     rec: RecordingStream,
@@ -233,7 +233,7 @@ fn only_captures_that_changed_are_written_and_deleted_ones_are_cleared() {
     let deleted = bench.write(&with_captures(&model, &[1, 3, 4]));
     assert_eq!(captures(&deleted), strings(&["2"]));
     assert!(deleted["/base/captures/2"].components.contains("Clear:is_recursive"));
-    // Taken back: it is there again, later than it was cleared.
+    // Undone: it is there again, later than it was cleared.
     let back = bench.write(&with_captures(&model, &[1, 2, 3, 4]));
     assert!(back["/base/captures/2"].components.contains("Transform3D:translation"));
     assert_eq!(bench.writer.clock.captures, 5);

@@ -1,4 +1,4 @@
-//! The board as it is tracked.
+//! The tracked board.
 
 use handeye_geometry::point_error;
 use rerun::{Points3D, Radius};
@@ -14,7 +14,7 @@ use super::style;
 use handeye_workbench::model::Tracked;
 use handeye_workbench::scene::Known;
 
-/// What one image has brought; what it has not is no longer there.
+/// The result of one image; what it lacks is no longer there.
 pub(super) fn write(pen: Pen<'_>, known: &Known, tracked: &Tracked) -> Result<(), RecordError> {
     let update = &tracked.update;
     write_estimate(pen, known, tracked)?;

@@ -1,11 +1,11 @@
 //! The server from which viewers read, and the page with the web viewer: one port, of this machine.
 //!
 //! A server of Rerun keeps what it has sent for viewers that come later, up to a limit, and forgets the oldest first. Images
-//! would push the captures out, so what lasts and what is live are kept by two of them, and read as one.
+//! would push the captures out, so lasting and live entries are kept by two of them, and read as one.
 //!
-//! Rerun's own server listens by itself, and answers whoever asks and by whatever name (`docs/reference/rerun_viewers.md` has
-//! what was measured). So what it serves is taken out of it here and put behind a [`Door`], in this process: there is no port
-//! behind the door that somebody else could find.
+//! Rerun's own server listens on its own port, and answers every client under every host name
+//! (`docs/reference/rerun_viewers.md` has the measurements). So its service is extracted here and put behind a [`Door`], in
+//! this process: there is no port behind the door that another client could find.
 
 mod page;
 mod proxy;
@@ -27,13 +27,13 @@ pub use relay::Relay;
 /// Threads of the server, however many connections there are.
 const THREADS: usize = 2;
 
-/// What is kept of what lasts, for viewers that come later \[bytes\].
+/// Size of the lasting entries that are kept for viewers that come later \[bytes\].
 pub const LASTING_BYTES: u64 = 128 * 1024 * 1024;
 
-/// What is kept of what is live, for viewers that come later \[bytes\].
+/// Size of the live entries that are kept for viewers that come later \[bytes\].
 pub const LIVE_BYTES: u64 = 32 * 1024 * 1024;
 
-/// The server; it ends when this is dropped, without being waited for.
+/// The server; it ends when this is dropped, without waiting for it.
 pub struct Server {
     lasting: SharedSink,
     live: SharedSink,
@@ -42,7 +42,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// Starts it on a free port of 127.0.0.1, and has the recording served by `relay` as well.
+    /// Starts it on a free port of 127.0.0.1, and lets `relay` serve the recording as well.
     ///
     /// # Errors
     /// When there is no port or no thread.
@@ -57,12 +57,12 @@ impl Server {
         Ok(Self { lasting, live, door, runtime: Some(runtime) })
     }
 
-    /// Where a stream for it writes to.
+    /// The target of streams for it.
     pub fn target(&self) -> Target {
         Target::Viewers { lasting: self.lasting.clone(), live: self.live.clone() }
     }
 
-    /// What viewers read.
+    /// The address for viewers.
     pub fn url(&self) -> String {
         format!("rerun+http://{}/proxy", self.door.address())
     }

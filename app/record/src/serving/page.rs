@@ -1,5 +1,5 @@
-//! The page with the web viewer. It comes out of this program and asks nobody else for anything: what it loads and where it
-//! connects to is in the policy that is sent along, and the browser sees to it.
+//! The page with the web viewer. It is embedded in this program and uses no other server: what it may load and where it may
+//! connect to is in the policy that is sent along, which the browser enforces.
 
 use std::io;
 use std::sync::Arc;
@@ -16,10 +16,10 @@ use re_web_viewer_server::WebViewerData;
 
 use handeye_workbench::recording::BROWSER_PATH;
 
-/// What the viewer's page reads its progress from.
+/// The header that the viewer's page reads its progress from.
 const FINAL_LENGTH: HeaderName = HeaderName::from_static("rerun-final-length");
 
-/// What the browser may load and where it may connect to: what serves this page, and nothing else.
+/// What the browser may load and where it may connect to: the server of this page only.
 const POLICY: HeaderValue = HeaderValue::from_static(
     "default-src 'none'; script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; \
      img-src 'self' data: blob:; font-src 'self' data:; connect-src 'self' data: blob:; worker-src 'self' blob:; \
@@ -35,7 +35,7 @@ pub(super) struct Files {
     index: Bytes,
 }
 
-/// A part of the viewer: it stands in the program itself and is not copied for a browser.
+/// A part of the viewer: it is embedded in the program and is not copied for a browser.
 struct Part(Arc<WebViewerData>, fn(&WebViewerData) -> &[u8]);
 
 impl AsRef<[u8]> for Part {
@@ -48,7 +48,7 @@ impl Files {
     /// The viewer.
     ///
     /// # Errors
-    /// When this build has none.
+    /// When this build does not contain it.
     pub(super) fn load() -> io::Result<Self> {
         let viewer = WebViewerData::load(None).map_err(io::Error::other)?;
         let index = without_foreign_links(&String::from_utf8_lossy(viewer.index_html())).into();
@@ -78,7 +78,7 @@ impl Files {
     }
 }
 
-/// The page asks for a font elsewhere; it looks the same without.
+/// The page requests a font from another server; it looks the same without.
 fn without_foreign_links(html: &str) -> String {
     let mut kept = String::with_capacity(html.len());
     let mut rest = html;

@@ -23,7 +23,7 @@ use tokio_stream::wrappers::ReceiverStream;
 /// Reads from a server without a connection.
 pub(super) type Reader = MessageProxyServiceClient<MessageProxyServiceServer<MessageProxy>>;
 
-/// Messages on their way to the server; an image is one.
+/// Messages in flight to the server; an image is one.
 const ON_THE_WAY: usize = 8;
 
 /// Takes messages to a server.
@@ -31,11 +31,11 @@ pub(super) struct ProxySink(mpsc::Sender<ProxyMessage>);
 
 enum ProxyMessage {
     Message(Box<WriteMessagesRequest>),
-    /// Everything before has arrived.
+    /// Everything sent before has arrived.
     Flush(SyncSender<()>),
 }
 
-/// Starts a server that keeps so many bytes for viewers that come later.
+/// Starts a server that keeps this many bytes for viewers that come later.
 pub(super) fn start(runtime: &Runtime, limit_bytes: u64) -> (ProxySink, Reader) {
     let _inside = runtime.enter();
     let options = ServerOptions { memory_limit: MemoryLimit::from_bytes(limit_bytes), ..ServerOptions::default() };
@@ -49,7 +49,7 @@ pub(super) fn start(runtime: &Runtime, limit_bytes: u64) -> (ProxySink, Reader) 
         let messages = ReceiverStream::new(messages).filter_map(|it| match it {
             ProxyMessage::Message(message) => Some(*message),
             ProxyMessage::Flush(arrived) => {
-                // Whoever asked may have gone.
+                // The caller may be gone.
                 let _told = arrived.try_send(()).is_ok();
                 None
             }
@@ -77,7 +77,7 @@ impl LogSink for ProxySink {
 
     fn flush_blocking(&self, timeout: Duration) -> Result<(), SinkFlushError> {
         let (arrived, arrival) = sync_channel(1);
-        // Once the server has ended nobody waits for anything.
+        // Once the server has ended nothing has to be waited for.
         let asked = self.0.blocking_send(ProxyMessage::Flush(arrived)).is_ok();
         match if asked { arrival.recv_timeout(timeout) } else { Ok(()) } {
             Err(RecvTimeoutError::Timeout) => Err(SinkFlushError::Timeout),

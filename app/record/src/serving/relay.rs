@@ -1,4 +1,4 @@
-//! Page and recording behind one port: our own, and that of `handeye serve` for a browser that reaches no other.
+//! Page and recording behind one port: our own, and that of `handeye serve` for a browser that can reach no other.
 
 use std::io;
 use std::pin::Pin;
@@ -24,13 +24,13 @@ use super::page::{Files, encoded};
 use super::proxy::Reader;
 use handeye_workbench::recording::BROWSER_PATH;
 
-/// What a viewer asks for; what else the service can do is to write into the recording.
+/// The request of a viewer; the other calls of the service write into the recording.
 const READ: &str = "/rerun.sdk_comms.v1alpha1.MessageProxyService/ReadMessages";
 
 /// Files of the viewer.
 const FILE: &str = "/rerun/{file}";
 
-/// The browser asks again after a second.
+/// The browser requests it again after a second.
 const REFRESH: HeaderName = HeaderName::from_static("refresh");
 
 /// The recording and the page that shows it, once there is something to look at.
@@ -38,7 +38,7 @@ const REFRESH: HeaderName = HeaderName::from_static("refresh");
 pub struct Relay(Mutex<Option<Router>>);
 
 impl Relay {
-    /// From now on this is served: what lasts, and what is live.
+    /// From now on these are served: lasting and live entries.
     ///
     /// # Errors
     /// When there is no page.
@@ -46,7 +46,7 @@ impl Relay {
         let service = MessageProxyServiceServer::new(Both(readers))
             .max_decoding_message_size(MAX_DECODING_MESSAGE_SIZE)
             .max_encoding_message_size(MAX_ENCODING_MESSAGE_SIZE);
-        // A page that another program of this machine serves asks whether it may read from this port.
+        // A page that another program of this machine serves asks for permission to read from this port.
         let service = cors_layer(&[]).layer(GrpcWebLayer::new().layer(service));
         let routes = Router::new()
             .route_service(READ, service)
@@ -57,7 +57,7 @@ impl Relay {
         Ok(())
     }
 
-    /// What is asked for: the recording to read, and the page. Whoever asks has been let in by whoever listens.
+    /// The routes: the recording to read, and the page. Access is checked by the server that listens.
     pub fn routes(self: &Arc<Self>) -> Router {
         let answered = any(answer).with_state(Arc::clone(self));
         Router::new().route(READ, answered.clone()).route(BROWSER_PATH, answered.clone()).route(FILE, answered)
@@ -77,7 +77,7 @@ async fn file(State(files): State<Arc<Files>>, uri: Uri) -> Response {
     files.answer(&uri)
 }
 
-/// The page; the viewer is told in its address where the recording is.
+/// The page; its address contains where the recording is.
 async fn page(State(files): State<Arc<Files>>, request: Request) -> Response {
     if request.uri().query().is_some() {
         return files.answer(request.uri());

@@ -9,10 +9,10 @@ use crate::stream::Stream;
 /// Longer than anything takes on a busy machine.
 const SOON: Duration = Duration::from_mins(1);
 
-/// What a recording has before anything has happened \[bytes\]; all that is refused says less.
+/// Size of an empty recording \[bytes\]; a refusal is shorter.
 const A_RECORDING: usize = 1000;
 
-/// What comes after a call of the service as a browser makes it: the head, and as much of the rest as says whether there
+/// The response to a call of the service as a browser makes it: the head, and as much of the rest as shows whether there
 /// is a recording in it.
 fn call(url: &str, method: &str, headers: &str) -> (String, usize) {
     let address = url.strip_prefix("rerun+http://").and_then(|rest| rest.strip_suffix("/proxy")).expect("an address");
@@ -112,7 +112,7 @@ fn the_page_names_no_other_machine_and_forbids_the_browser_to_ask_one() {
     assert!(head.contains("connect-src 'self' data: blob:;"), "{head}");
     assert!(html.contains("the_canvas_id") && html.contains("favicon.ico"));
     assert!(!html.contains("fonts.g"), "fonts are asked for elsewhere");
-    // Where the recording is, it says to whoever asks for the page alone.
+    // The page alone redirects to where the recording is.
     let there = get(&server, "/rerun/");
     assert!(
         there.starts_with("HTTP/1.1 303") && there.contains("url=rerun%2Bhttp%3A%2F%2Flocalhost%3A1%2Fproxy"),

@@ -1,4 +1,4 @@
-// The page of the Handeye Workbench: shows the frames that `handeye serve` draws, and sends what a person does.
+// The page of the Handeye Workbench: shows the frames that `handeye serve` draws, and sends the user's input.
 // The messages are described in docs/reference/browser.md.
 'use strict';
 
@@ -6,15 +6,15 @@ const element = (id) => document.getElementById(id);
 const [canvas, typing, bar, barText, driveButton, stopButton, keyboardButton, note] =
   ['frame', 'typing', 'bar', 'bar-text', 'drive', 'stop', 'keyboard', 'note'].map(element);
 
-/// While something is held down, it is said so often [ms]; when it is no longer said, the window lets go of it.
+/// Interval of reports while something is held down [ms]; without them, the window releases it.
 const RENEWAL_MS = 50;
-/// Between two attempts to connect, at first and at most [ms].
+/// Delay between two attempts to connect: first and longest [ms].
 const RETRY_MS = [300, 4000];
-/// Heard at least so often, or what is shown is not known to be so any more [ms]. The server says every second that it is there.
+/// Longest silence of the server before the display counts as stale [ms]. The server reports every second that it is alive.
 const STALE_MS = 4000;
-/// Heard at least so often, or the connection is made anew [ms].
+/// Longest silence of the server before the connection is made again [ms].
 const SILENCE_MS = 15000;
-/// Longest text that is pasted at once [letters]; the server takes no more.
+/// Longest text that is pasted at once [characters]; the server accepts no more.
 const MOST_PASTED = 4096;
 
 let words = {
@@ -24,7 +24,7 @@ let words = {
   not_uploaded: 'The files could not be uploaded',
 };
 let people = { you: true, driven: true, pages: 1 };
-/// Whether fingers are used here: the keyboard of the screen then comes only when it is asked for.
+/// Whether touch input is used here: the on-screen keyboard then only appears on request.
 let touched = matchMedia('(pointer: coarse)').matches;
 
 // ---------------------------------------------------------------- the frame
@@ -41,7 +41,7 @@ const show = {
   },
 
   heard(data) {
-    // Drawing starts anew after the graphics driver did.
+    // Drawing restarts after a restart of the graphics driver.
     if (data.lost) { setTimeout(() => location.reload(), 500); return; }
     if (data.lost === false) { sayNote(data.failed); return; }
     if (data.connection !== connection.count) return;
@@ -53,7 +53,7 @@ const show = {
     connection.send({ t: 'shown', number: data.number });
   },
 
-  /// A place of the page in points of the frame.
+  /// A position on the page in points of the frame.
   pointOf(event) {
     const area = canvas.getBoundingClientRect();
     const size = this.frame?.size ?? [area.width, area.height];
@@ -61,7 +61,7 @@ const show = {
   },
 };
 
-/// The frame as large as there is room for; where one drives, it is made for this room.
+/// Scales the frame to the available room; on the driving page, it is drawn for this room.
 function fit() {
   if (!show.frame) return;
   const stage = element('stage');
@@ -76,9 +76,9 @@ function fit() {
 class Connection {
   constructor() {
     this.retry = RETRY_MS[0];
-    /// When the server was last heard.
+    /// When the server last sent something.
     this.heard = new Date();
-    /// How many connections there were.
+    /// Number of connections so far.
     this.count = 0;
     this.name = sessionStorage.getItem('page') ?? [...crypto.getRandomValues(new Uint8Array(12))]
       .map((byte) => byte.toString(16).padStart(2, '0')).join('');
@@ -118,7 +118,7 @@ class Connection {
     this.watch();
   }
 
-  /// A network that is gone says nothing, not even that.
+  /// A lost network reports nothing, not even its loss.
   watch() {
     clearTimeout(this.watchdog);
     clearTimeout(this.stale);
@@ -151,7 +151,7 @@ function heard(told) {
     reader.button.textContent = words.reads;
     sayBar();
   } else if (told.t === 'controls') {
-    // What was on its way when it was switched off.
+    // It may have been in flight when it was switched off.
     if (reader.on) reader.show(told.controls);
   } else if (told.t === 'copy') {
     copy(told.text);
@@ -168,7 +168,7 @@ function sayBar() {
   fit();
 }
 
-/// What is shown is not known to be so since a time, or is so now: it is grey, and STOP, which acts no more, says so.
+/// The display is stale since a time, or is live again: if stale it is grey, and STOP, which has no effect then, shows that.
 let isStale = false;
 function sayStale(since) {
   if (isStale === Boolean(since)) return;
@@ -195,7 +195,7 @@ function sayScreen() {
 
 async function copy(text) {
   if (navigator.clipboard) {
-    try { return await navigator.clipboard.writeText(text); } catch { /* Without the right to it, the old way. */ }
+    try { return await navigator.clipboard.writeText(text); } catch { /* Without the permission, use the fallback. */ }
   }
   typing.value = text;
   typing.select();
@@ -212,7 +212,7 @@ function visit(url) {
   link.click();
 }
 
-// ---------------------------------------------------------------- what a person does
+// ---------------------------------------------------------------- input of the user
 
 let pending = [];
 const down = { buttons: new Set(), keys: new Map(), touches: new Set() };
@@ -232,7 +232,7 @@ function flush() {
   if (events.length) connection.send({ t: 'input', events });
 }
 
-/// As long as something is down and the page is in front, the window hears of it.
+/// As long as something is held down and the page is in front, this is reported to the window.
 function renew() {
   const held = down.buttons.size || down.keys.size || down.touches.size;
   if (held && !renewal) renewal = setInterval(() => connection.send({ t: 'held' }), RENEWAL_MS);
@@ -242,13 +242,13 @@ function renew() {
   }
 }
 
-/// Nothing is down any more, as far as this page knows; the window lets go when it hears nothing.
+/// Nothing is held down any more, as far as this page knows; the window releases it when the reports stop.
 function letGo() {
   for (const held of Object.values(down)) held.clear();
   renew();
 }
 
-/// The first letters of a text; one that is two numbers long is not cut in two.
+/// The first characters of a text; a surrogate pair is not cut in two.
 const cut = (text) => (text.length > MOST_PASTED ? [...text.slice(0, 2 * MOST_PASTED)].slice(0, MOST_PASTED).join('') : text);
 
 const modifiersOf = (event) =>
@@ -295,7 +295,7 @@ canvas.addEventListener('wheel', (event) => {
   done({ e: 'wheel', by: [-event.deltaX, -event.deltaY], lines, modifiers: modifiersOf(event) });
 }, { passive: false });
 
-/// Keys that the browser would do something of its own with, and that the window has a use for.
+/// Keys that have an action in the browser, and that the window uses.
 const OURS = new Set(['Tab', 'F1', 'Escape', 'ArrowUp', 'ArrowDown', 'ArrowLeft', 'ArrowRight', 'PageUp', 'PageDown',
   'Home', 'End', 'Delete', 'Backspace', 'Enter', 'Alt']);
 const OURS_WITH_CTRL = new Set(['k', 'p', 's', 'o', 'z', 'y', 'a', 'n', 'f', 'Enter']);
@@ -307,7 +307,7 @@ document.addEventListener('keydown', (event) => {
   const withCtrl = event.ctrlKey || event.metaKey;
   const letter = event.key.length === 1 ? event.key.toLowerCase() : event.key;
   if (withCtrl ? OURS_WITH_CTRL.has(letter) : OURS.has(event.key)) event.preventDefault();
-  // The clipboard speaks for itself.
+  // The clipboard has events of its own.
   if (withCtrl && ['c', 'x', 'v'].includes(letter)) return;
   down.keys.set(event.code, event.key);
   renew();
@@ -328,7 +328,7 @@ typing.addEventListener('compositionend', (event) => {
 typing.addEventListener('input', (event) => {
   if (event.isComposing) return;
   if (event.inputType === 'deleteContentBackward' && !down.keys.size) {
-    // A keyboard of the screen deletes without a key.
+    // An on-screen keyboard deletes without a key event.
     for (const isDown of [true, false]) done({ e: 'key', key: 'Backspace', down: isDown, modifiers: 0 });
   } else if (event.data && event.inputType !== 'insertCompositionText') {
     done({ e: 'text', text: cut(event.data) });
@@ -342,7 +342,7 @@ document.addEventListener('paste', (event) => {
   done({ e: 'paste', text: cut(event.clipboardData.getData('text/plain')) });
 });
 
-/// Where text is typed, a keyboard of the screen and the candidates of an input method have their place.
+/// Positions the on-screen keyboard and the candidates of an input method where text is typed.
 function placeTyping(place) {
   const wanted = Boolean(place) && people.you;
   keyboardButton.hidden = !(wanted && touched && document.activeElement !== typing);
@@ -376,7 +376,7 @@ const reader = {
   on: false,
   button: element('reads'),
   list: element('controls'),
-  /// Elements by the number of their control.
+  /// Elements by the id of their control.
   elements: new Map(),
 
   say() {
@@ -393,7 +393,7 @@ const reader = {
     let last = null;
     for (const control of controls) {
       const shown = this.element(control);
-      // One that stays where it is keeps the keyboard.
+      // An element that is not moved keeps the keyboard focus.
       const next = last ? last.nextSibling : this.list.firstChild;
       if (shown !== next) this.list.insertBefore(shown, next);
       last = shown;
@@ -412,7 +412,7 @@ const reader = {
         shown.addEventListener('click', () => {
           const isTyped = role === 'textbox';
           done({ e: 'control', id, press: !isTyped });
-          // Keys go to the window from there.
+          // From there, keys are sent to the window.
           if (isTyped) typing.focus({ preventScroll: true });
         });
         shown.addEventListener('focus', () => done({ e: 'control', id, press: false }));
@@ -433,7 +433,7 @@ reader.button.addEventListener('click', () => { reader.on = !reader.on; reader.s
 
 // ---------------------------------------------------------------- files
 
-/// Every file of what was dropped, with its path from there.
+/// Every dropped file, with its path relative to the dropped entry.
 async function filesOf(entry, path = '') {
   const name = path + entry.name;
   if (entry.isFile) return [[name, await new Promise((resolve, reject) => entry.file(resolve, reject))]];

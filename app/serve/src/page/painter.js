@@ -1,5 +1,5 @@
-// Draws the frames that `handeye serve` sends, on a thread of its own: the page stays free for what a person does, and
-// says in time that a button is still held. The messages are described in docs/reference/browser.md.
+// Draws the frames that `handeye serve` sends, on a thread of its own: the page stays free for the user's input, and
+// reports in time that a button is still held. The messages are described in docs/reference/browser.md.
 'use strict';
 
 class Painter {
@@ -142,7 +142,7 @@ async function inflated(bytes) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-/// The chunks of the frame before, with what changed.
+/// The chunks of the previous frame, with the changes.
 function merged(before, list) {
   const view = new DataView(list.buffer, list.byteOffset, list.byteLength);
   const chunks = [];
@@ -171,7 +171,7 @@ function chunkOf(bytes) {
   return { clip, texture, vertexCount, vertices: bytes.subarray(28, end), indices };
 }
 
-/// What is shown of one connection after the other.
+/// The display of one connection after the other.
 class Show {
   constructor(canvas) {
     this.painter = new Painter(canvas);
@@ -218,7 +218,7 @@ class Show {
     head.free.forEach((id) => this.painter.freeTexture(id));
     this.chunks = chunks;
     const { connection } = this;
-    // A page that is not seen asks for nothing more.
+    // A page that is not visible requests nothing more.
     requestAnimationFrame(() => {
       if (!isCurrent()) return;
       this.painter.paint({ chunks, size: head.size, scale: head.pixels_per_point });

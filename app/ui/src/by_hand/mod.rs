@@ -1,4 +1,5 @@
-//! Guided capture for an arm that a person moves: the window shows how the board is to look in the image and what to change,
+//! Guided capture for an arm that is moved by hand: the window shows how the board should look in the image and what to
+//! change.
 
 pub(crate) mod overlay;
 pub(crate) mod section;

@@ -1,5 +1,5 @@
-//! The view that is wanted, over the live image: an outline, an arrow from each corner of the board to where it has to go, and
-//! what to change in words.
+//! The wanted view, over the live image: an outline, an arrow from each corner of the board to where it has to go, and what to
+//! change in words.
 
 use egui::{Align2, Color32, Painter, Pos2, Shape, Stroke};
 use handeye_geometry::frames::{Camera, Pose, Target};
@@ -16,7 +16,7 @@ use handeye_workbench::model::Model;
 
 /// Size of the words over the image.
 const WORDS: f32 = 16.0;
-/// An arrow that is shorter says nothing.
+/// A shorter arrow is not drawn.
 const SHORTEST: f32 = 10.0;
 
 pub fn paint(painter: &Painter, model: &Model, target: &TargetSpec, place: &Place) {

@@ -1,4 +1,4 @@
-//! What a person who is guided has to do, in the pane of the poses.
+//! What the guided user has to do, in the pane of the poses.
 
 use egui::{Button, RichText, Spinner, Ui, Vec2};
 use handeye_plan::guided::CHECKS;
@@ -14,7 +14,7 @@ use handeye_workbench::model::Model;
 use handeye_workbench::text::Text;
 use handeye_workbench::tr;
 
-/// The button that begins.
+/// The start button.
 pub fn begin_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, height: f32, outbox: &mut Outbox) {
     let language = model.view.language;
     let reason = hindrance.or_else(|| blocked(model));
@@ -67,7 +67,7 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, hand: &ByHand, outbox: &mut Outbo
     });
 }
 
-/// What a person has to do now.
+/// What the user has to do now.
 pub fn to_do(hand: &ByHand) -> Text {
     match (hand.waits, hand.judged) {
         (HandWaits::Answer, _) => text!("Solving…"),
@@ -83,7 +83,7 @@ pub fn to_do(hand: &ByHand) -> Text {
         (HandWaits::View, Some(judged)) if judged.is_good => text!("Good: hold still"),
         (HandWaits::View, Some(judged)) => {
             let advice = judged.deviation.and_then(|deviation| deviation.advice());
-            // Near the view, and the board is cut off by the edge of the image.
+            // Near the view, but the board is cut off by the edge of the image.
             advice.unwrap_or_else(|| text!("The whole board has to be in the image: bring it towards the middle"))
         }
     }

@@ -1,4 +1,4 @@
-//! Everything that the window says about captures, gathered once for all panes and again only when it changed.
+//! Everything that the window shows about captures, gathered once for all panes and again only when it changed.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -18,7 +18,7 @@ pub const CELLS: (usize, usize) = (8, 6);
 /// What was seen in the image of a capture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Detected {
-    /// It is being looked at.
+    /// It is being searched.
     NotYet,
     Board,
     NoBoard,
@@ -26,11 +26,11 @@ pub enum Detected {
     Unreadable,
 }
 
-/// A capture that the estimate left out as an outlier, because it does not fit the others.
+/// A capture that the estimate excluded as an outlier, because it does not fit the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RejectedCapture {
-    /// How far its board is from where the others put it \[mm\] and by how much it is turned \[deg\]; `None` where its corners
-    /// are no image of the board.
+    /// How far its board is from where the others put it \[mm\] and by how much it is rotated \[deg\]; `None` if its corners
+    /// are not an image of the board.
     pub board_off: Option<(f64, f64)>,
 }
 
@@ -41,7 +41,7 @@ pub struct CaptureRow {
     /// The taught pose at which it was taken.
     pub pose_name: Option<String>,
     pub role: Role,
-    /// Whether a person took it out.
+    /// Whether the user excluded it.
     pub excluded: bool,
     /// What was seen.
     pub seen: Detected,
@@ -55,9 +55,9 @@ pub struct CaptureRow {
     pub influence_mm: Option<f64>,
     /// Noise of a corner of its image \[px\].
     pub corner_noise_px: Option<f64>,
-    /// How far it is from the others, where the estimate set it aside.
+    /// How far it is from the others, if the estimate excluded it.
     pub aside: Option<RejectedCapture>,
-    /// How many of its corners the estimate left out as an outlier.
+    /// How many of its corners the estimate excluded as outliers.
     pub corners_aside: usize,
     /// What the calibration finds remarkable about it.
     pub found: Vec<FindingCode>,
@@ -69,12 +69,12 @@ impl CaptureRow {
         self.role == Role::Verification
     }
 
-    /// Whether the answer is without it although it is meant to be in the fit.
+    /// Whether the answer does not use it although it is meant to be in the fit.
     pub fn is_aside(&self) -> bool {
         self.aside.is_some() && !self.excluded && !self.verifies()
     }
 
-    /// What it counts for.
+    /// What it is used for.
     pub fn used_as(&self) -> CaptureUse {
         match (self.excluded, self.role) {
             (true, _) => CaptureUse::Excluded,
@@ -84,7 +84,7 @@ impl CaptureRow {
         }
     }
 
-    /// Its name for people: `7 · above left`.
+    /// Its name for display: `7 · above left`.
     pub fn title(&self) -> String {
         match &self.pose_name {
             Some(name) => format!("{} · {name}", self.id),
@@ -104,7 +104,7 @@ pub struct CaptureTable {
     pub outlined: Vec<usize>,
     /// Width and height of the images \[px\].
     pub image_size: (u32, u32),
-    /// What all this was made from; kept so that it can be told from anything else.
+    /// What all this was made from; kept to detect changes.
     made_from: Sources,
 }
 
@@ -160,7 +160,7 @@ pub fn table(ctx: &Context, model: &Model) -> Arc<CaptureTable> {
 }
 
 impl CaptureTable {
-    /// How many captures there are that count for something.
+    /// How many captures have this use.
     pub fn count(&self, used_as: CaptureUse) -> usize {
         self.rows.iter().filter(|row| row.used_as() == used_as).count()
     }
@@ -185,7 +185,7 @@ impl CaptureTable {
             Some(CoveredView { name: &record.image, corners: observed.corners.as_deref()?, in_fit: record.is_in_use() })
         });
         let coverage = (!seen.is_empty()).then(|| Coverage::new(image_size, CELLS, views));
-        // A view whose corners are no numbers has no outline.
+        // A view whose corners are not finite has no outline.
         let outlined = match &coverage {
             Some(coverage) if coverage.outlines.len() == seen.len() => seen.iter().map(|(index, _)| *index).collect(),
             Some(coverage) => {
@@ -227,7 +227,7 @@ fn plain_row(model: &Model, record: &CaptureRecord) -> CaptureRow {
     }
 }
 
-/// A number of a solve that is not finite is no number to show.
+/// A number of a solve that is not finite is not shown.
 fn finite(value: Option<f64>) -> Option<f64> {
     value.filter(|value| value.is_finite())
 }
@@ -236,7 +236,7 @@ fn add_solution(rows: &mut [CaptureRow], solved: &Solved) {
     let index: HashMap<CaptureId, usize> = rows.iter().enumerate().map(|(i, row)| (row.id, i)).collect();
     for (id, view) in solved.captures.iter().zip(&solved.calibration.views) {
         let Some(row) = index.get(id).map(|&i| &mut rows[i]) else { continue };
-        // What changed sides since the solve has no number of this kind until the next one.
+        // A capture whose purpose changed since the solve has no number of this kind until the next one.
         if row.verifies() {
             continue;
         }

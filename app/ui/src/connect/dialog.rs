@@ -9,7 +9,7 @@ use handeye_workbench::model::{Model, ViewerState};
 use handeye_workbench::shell;
 use handeye_workbench::tr;
 
-/// The dialog; it goes with the viewer.
+/// The dialog; it closes with the viewer.
 pub fn address_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     let ViewerState::Web { url } = &model.rerun.viewer else {

@@ -16,7 +16,7 @@ use handeye_workbench::text::Text;
 use handeye_workbench::tr;
 use handeye_workbench::{connect, session};
 
-/// What the user is about to connect to; it belongs to nothing but the window.
+/// What the user is about to connect to; known to the window only.
 #[derive(Debug, Clone, Default)]
 struct Draft {
     /// Which kind of cell is wanted; `None` while the user has chosen nothing.
@@ -27,7 +27,7 @@ struct Draft {
     address: Option<String>,
     /// Where the scene there has the parts of the cell.
     objects: objects::Draft,
-    /// The drivers of a robot that is driven, and of one that a person moves.
+    /// The drivers of a robot that is driven, and of one that is moved by hand.
     drivers: [Option<crate::connect::drivers::pane::Draft>; 2],
 }
 

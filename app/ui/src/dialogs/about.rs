@@ -1,4 +1,4 @@
-//! What this program is, and under which licences it and its fonts are.
+//! What this program is, and the licences of it and its fonts.
 
 use egui::{RichText, Ui};
 

@@ -1,5 +1,5 @@
-//! Dialogs over the window: folders and files, keys, the address of a page, and what this program is. They block nothing: STOP can be pressed
-//! beside them.
+//! Dialogs over the window: folders and files, keys, the address of a page, and what this program is. They block nothing: STOP can
+//! still be pressed.
 
 mod about;
 
@@ -60,7 +60,7 @@ fn over_ui(ctx: &Context, width: f32, outbox: &mut Outbox, content_ui: impl FnOn
     }
 }
 
-/// Whether the pointer was pressed outside of what is over the window. What is there does what it does: STOP stops.
+/// Whether the pointer was pressed outside of what is over the window. The widget there still works: STOP stops.
 pub fn pressed_outside(ctx: &Context, rect: Rect) -> bool {
     ctx.input(|input| {
         input.pointer.any_pressed() && input.pointer.interact_pos().is_some_and(|position| !rect.contains(position))

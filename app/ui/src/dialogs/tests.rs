@@ -36,7 +36,7 @@ fn driven(dialog: Dialog) -> Driven {
     Driven::new(shown_ui, model)
 }
 
-/// What was asked for before the dialog closed, which it does when no session is on its way.
+/// What was requested before the dialog closed, which it does when no session is on its way.
 fn first(commands: Vec<Command>) -> Command {
     commands.into_iter().next().expect("a command")
 }

@@ -81,7 +81,7 @@ fn files_ui(ui: &mut Ui, found: &Found, language: Language) {
     }
 }
 
-/// The first images of what is looked at, with the pose that belongs to each by the hypothesis that is chosen.
+/// The first images of what is searched, with the pose that belongs to each by the chosen hypothesis.
 fn images_ui(ui: &mut Ui, import: &ImportState, found: &Found, language: Language) {
     let hypothesis = found.hypotheses().get(import.chosen.unwrap_or(0));
     let stream = match hypothesis.map(|h| h.source) {
@@ -95,7 +95,7 @@ fn images_ui(ui: &mut Ui, import: &ImportState, found: &Found, language: Languag
             let image = &found.recording.streams[stream].images[index];
             let pose = hypothesis.and_then(|h| pose_of(found, h, index));
             let size = [preview.width() as usize, preview.height() as usize];
-            // What it shows is kept with it, so that another recording takes its place.
+            // The texture is kept with it, so that another recording replaces it.
             let id = Id::new(("image of a recording", index));
             let kept = ui.ctx().data_mut(|data| data.get_temp::<(Arc<RgbImage>, TextureHandle)>(id));
             let texture = kept.filter(|(shown, _)| Arc::ptr_eq(shown, preview)).map_or_else(
@@ -128,7 +128,7 @@ fn pose_of(found: &Found, h: &Hypothesis, image: usize) -> Option<String> {
 
 fn target_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mut Outbox) {
     parts::section_ui(ui, tr!(language, "Target"));
-    // Of another recording it is another one.
+    // Another recording has its own.
     let id = Id::new(("target of the recording", &import.path));
     let mut typed: String = ui.data_mut(|data| data.get_temp(id)).unwrap_or_else(|| import.target.clone());
     ui.horizontal(|ui| {
@@ -153,7 +153,7 @@ fn target_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mut
     );
 }
 
-/// Settings that a person types; the others are chosen among what the data allow.
+/// Settings that the user types; the others are chosen among what the data allow.
 const ARM: &str = "arm";
 const IMAGE_SIZE: &str = "image_size";
 
@@ -161,7 +161,7 @@ fn is_typed(key: &str) -> bool {
     matches!(key, ARM | IMAGE_SIZE)
 }
 
-/// A setting that a person types.
+/// A setting that the user types.
 struct Typed {
     key: &'static str,
     label: Text,
@@ -182,7 +182,7 @@ impl Typed {
         }
     }
 
-    /// How large the images were that corners are from.
+    /// The size of the images that corners come from.
     fn image_size() -> Self {
         Self {
             key: IMAGE_SIZE,
@@ -282,7 +282,7 @@ fn meaning_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mu
     });
 }
 
-/// How long the files may be read, where nothing came of it.
+/// How long the files may be read, if that was not enough.
 fn time_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mut Outbox) {
     let now = import.time.as_secs();
     parts::row_ui(ui, tr!(language, "Time for reading"), |ui| {

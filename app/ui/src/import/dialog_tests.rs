@@ -172,7 +172,7 @@ fn what_is_known_is_fixed_and_given_back_to_the_data() {
     );
 }
 
-/// The command line names the option; whoever is at the window needs a field.
+/// The command line names the option; a user at the window needs a field.
 #[test]
 fn the_size_of_images_that_no_file_tells_is_typed() {
     let corners = |size: (u32, u32)| {

@@ -1,3 +1,3 @@
-//! Other people's recordings become data sets and sessions.
+//! Recordings of other tools become data sets and sessions.
 
 pub(crate) mod dialog;

@@ -1,4 +1,4 @@
-//! The boxes that the arm keeps out of, beside the 3D view: drawn, typed, read and written.
+//! The boxes that the arm keeps out of, next to the 3D view: drawn, typed, read and written.
 
 use egui::{
     Align, Button, DragValue, Frame, Id, Label, Layout, Margin, Rect, RichText, ScrollArea, TextEdit, Ui, UiBuilder,
@@ -20,7 +20,7 @@ use handeye_workbench::{keep_out, shell};
 const WIDTH: f32 = 268.0;
 /// Width that its whole name takes in the header.
 const NAME: f32 = 130.0;
-/// Farthest place and longest edge \[mm\]: more is refused in files, too.
+/// Farthest place and longest edge \[mm\]: files with more are refused, too.
 const FARTHEST_MM: f64 = 10_000.0;
 
 fn open_key() -> Id {
@@ -36,7 +36,7 @@ pub fn is_drawing(ui: &Ui) -> bool {
     ui.data(|data| data.get_temp(drawing_key())).unwrap_or(false)
 }
 
-/// Has a drag draw a box, or turn the view.
+/// Makes a drag draw a box, or turn the view.
 pub fn set_drawing(ui: &Ui, is_on: bool) {
     ui.data_mut(|data| data.insert_temp(drawing_key(), is_on));
 }
@@ -64,7 +64,7 @@ fn is_open(ui: &Ui) -> bool {
     ui.data(|data| data.get_temp(open_key())).unwrap_or(false)
 }
 
-/// What the editor leaves of a room for the cell to be in the middle of.
+/// The part of a room that the editor leaves for the cell.
 pub fn room_beside(ui: &Ui, room: Rect) -> Rect {
     let is_beside = is_open(ui) && room.width() > 2.0 * WIDTH;
     if is_beside { Rect::from_min_max(room.min, room.max - Vec2::new(WIDTH, 0.0)) } else { room }
@@ -146,7 +146,7 @@ fn boxes_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     }
 }
 
-/// One box; whether it is to go.
+/// One box; whether to remove it.
 fn box_ui(ui: &mut Ui, entry: &mut KeepOutBox, number: usize, language: Language) -> bool {
     let mut goes = false;
     ui.horizontal(|ui| {
@@ -169,7 +169,7 @@ fn box_ui(ui: &mut Ui, entry: &mut KeepOutBox, number: usize, language: Language
         }
         let mut yaw_deg = entry.yaw_deg.unwrap_or(0.0);
         let drag = ui.add(
-            // What a file has beyond the range stays as it is until somebody changes it.
+            // A value in a file that is out of range stays as it is until the user changes it.
             DragValue::new(&mut yaw_deg)
                 .range(-180.0..=180.0)
                 .clamp_existing_to_range(false)
@@ -214,7 +214,7 @@ fn millimetres_ui(ui: &mut Ui, caption: &str, metres: &mut [f64; 3], least_mm: f
                 .in_language(language);
             drag.widget_info(|| WidgetInfo { label: Some(label.clone()), ..WidgetInfo::drag_value(true, mm) });
             let drag = drag.on_hover_text(&label);
-            // What the file has below a millimetre, or beyond the range, stays as it is until somebody changes it.
+            // A fraction of a millimetre in a file, or a value out of range, stays as it is until the user changes it.
             if drag.changed() {
                 *value = mm * 1e-3;
             }

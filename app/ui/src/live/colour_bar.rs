@@ -1,4 +1,4 @@
-//! The bar that says which colour is which depth.
+//! The bar that shows which colour is which depth.
 
 use egui::{Align2, Color32, FontId, Mesh, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo, WidgetType};
 use handeye_geometry::depth::ColourMap;

@@ -4,7 +4,7 @@ use egui::{Pos2, Rect, Vec2};
 
 use handeye_workbench::model::{ImagePoint, Viewport};
 
-/// A pixel is then as large as a thumb nail.
+/// At this zoom a pixel is as large as a thumb nail.
 pub const LARGEST_ZOOM: f32 = 60.0;
 
 /// Where an image is on the screen.
@@ -49,7 +49,8 @@ impl Place {
     }
 }
 
-/// The middle of the room as part of the image, held so that no room is empty while there is image to fill it.
+/// The centre of the visible part, as a fraction of the image, clamped so that no room is empty while there is image to
+/// fill it.
 pub fn held(centre: Vec2, room: Vec2, image: Vec2) -> Vec2 {
     let hold = |centre: f32, room: f32, image: f32| {
         if image <= room || !centre.is_finite() {

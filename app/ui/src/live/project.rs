@@ -8,9 +8,9 @@ use nalgebra::Point3;
 
 use crate::live::place::Place;
 
-/// Pieces of a line of the length of a board.
+/// Pieces into which a line of the length of a board is divided.
 const PIECES: usize = 12;
-/// A point that is so many images away from the middle is not on the screen, and its place means little.
+/// A point that is this many images away from the centre is not on the screen, and its place means little.
 const FARTHEST: f64 = 3.0;
 
 /// What is needed to draw things of the board.

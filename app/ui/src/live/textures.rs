@@ -10,10 +10,10 @@ use image::RgbImage;
 use handeye_workbench::live::depth;
 use handeye_workbench::model::{FrameImages, Model, Observed};
 
-/// From this zoom on, pixels are shown as the squares that they are.
+/// From this zoom on, pixels are shown as squares.
 pub const CRISP_FROM: f32 = 4.0;
 
-/// Thumbnails that are kept; those that were not seen for longest go first.
+/// Thumbnails that are kept; the least recently seen are dropped first.
 const MOST_THUMBNAILS: usize = 256;
 
 /// Textures of the images that are shown, live or recorded.
@@ -24,14 +24,14 @@ pub struct LiveTextures {
     /// Depth in colours.
     pub depth: Option<TextureHandle>,
     review_range_m: Option<[f32; 2]>,
-    /// What was uploaded, and whether crisp; kept, so that no other images can be taken for them.
+    /// What was uploaded, and whether crisp; kept, so that a change of the images is detected.
     shown: Option<(Arc<FrameImages>, bool)>,
     #[cfg(test)]
     uploads: u64,
 }
 
 impl LiveTextures {
-    /// Uploads the images that are to be shown, unless they are there already.
+    /// Uploads the images to show, unless they are there already.
     pub fn update(&mut self, ctx: &Context, model: &Model) {
         let images = match &model.review {
             Some(review) => review.images.as_ref(),
@@ -112,7 +112,7 @@ pub struct Thumbnails {
 
 struct Thumbnail {
     texture: TextureHandle,
-    /// What it shows: kept, so that another image of the same capture can be told from it.
+    /// What it shows: kept, so that another image of the same capture is detected.
     image: Arc<RgbImage>,
     /// Frame of the window in which it was last drawn.
     last_seen: u64,

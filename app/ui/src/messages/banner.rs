@@ -1,5 +1,5 @@
-//! A card below the steps that says why the images are not live. There it moves nothing: a strip over the panes would shift
-//! what moves the arm under the pointer.
+//! A card below the steps that shows why the images are not live. In this place it moves nothing: a strip over the panes
+//! would shift the controls of the arm under the pointer.
 
 use egui::{CornerRadius, Frame, Label, Margin, RichText, ScrollArea, Stroke, Ui};
 

@@ -1,4 +1,4 @@
-//! What the program says: log, toasts, the banner.
+//! What the program reports: log, toasts, the banner.
 
 pub(crate) mod banner;
 pub(crate) mod pane;

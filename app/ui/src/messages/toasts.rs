@@ -1,4 +1,4 @@
-//! Messages below the steps, where they cover nothing. They go by themselves; errors stay until they are put aside.
+//! Messages below the steps, where they cover nothing. They disappear automatically; errors stay until they are closed.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ const ABOVE: f32 = 8.0;
 /// Distance between messages.
 const BETWEEN: f32 = 6.0;
 
-/// How long \[s\] a message stays; `None` until it is put aside.
+/// How long \[s\] a message stays; `None` until it is closed.
 fn lifetime_s(severity: Severity) -> Option<f64> {
     match severity {
         Severity::Info => Some(4.0),
@@ -36,7 +36,7 @@ fn lifetime_s(severity: Severity) -> Option<f64> {
     }
 }
 
-/// The messages that are up now, newest first: those that stand nowhere else where they could be seen.
+/// The messages that are up now, newest first: those that are not visible anywhere else.
 fn up<'a>(model: &'a Model, layout: &Layout) -> Vec<&'a Message> {
     let is_up = |message: &&Message| {
         let has_no_other_place = match message.home {
@@ -51,7 +51,7 @@ fn up<'a>(model: &'a Model, layout: &Layout) -> Vec<&'a Message> {
     model.messages.iter().rev().filter(is_up).take(MOST).collect()
 }
 
-/// Draws them into the room that is left, newest at the bottom. What has no room is in the log.
+/// Draws them into the room that is left, newest at the bottom. What does not fit is in the log.
 pub fn toasts_ui(ui: &mut Ui, model: &Model, layout: &Layout, outbox: &mut Outbox) {
     let language = model.view.language;
     let room = ui.available_rect_before_wrap();
@@ -85,7 +85,7 @@ fn galley(ui: &Ui, text: &str, width: f32) -> Arc<Galley> {
     ui.painter().layout_job(job)
 }
 
-/// One message; whether it is put aside.
+/// One message; whether it was closed.
 fn toast_ui(
     ui: &mut Ui,
     rect: Rect,

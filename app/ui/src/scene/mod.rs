@@ -1,3 +1,3 @@
-//! What stands where in the cell: one list of items, from which the 3D pane is painted and the recording is written.
+//! Where everything is in the cell: one list of items, from which the 3D pane is painted and the recording is written.
 
 pub(crate) mod pane;

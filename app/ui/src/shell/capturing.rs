@@ -1,14 +1,14 @@
-//! The capture that is under way or was refused, as several places say it.
+//! The capture that is under way or was refused, as shown in several places.
 
 use handeye_capture::Wait;
 use handeye_wording::text;
 use handeye_workbench::model::{CapturePurpose, CaptureUnderWay, CaptureWait, Model};
 use handeye_workbench::text::Text;
 
-/// A refusal stands over the image for so long \[s\]; after that the table of poses keeps it.
+/// A refusal is shown over the image for this long \[s\]; after that the table of poses keeps it.
 const REFUSAL_S: f64 = 8.0;
 
-/// Whether the last refusal of a capture stands over the image.
+/// Whether the last refusal of a capture is shown over the image.
 pub fn stands_over_image(model: &Model) -> bool {
     model.refused.as_ref().is_some_and(|refused| model.now_s - refused.at_s < REFUSAL_S)
 }

@@ -13,15 +13,15 @@ pub const STORAGE_KEY: &str = "layout";
 const IMAGE: [Pane; 1] = [Pane::Colour];
 /// The tabs at the upper right: the same in space.
 const SPACE: [Pane; 2] = [Pane::Depth, Pane::Scene];
-/// The tabs at the lower left: what there is.
+/// The tabs at the lower left: the records.
 const RECORDS: [Pane; 3] = [Pane::Poses, Pane::Charts, Pane::Log];
-/// The tabs at the lower right: what is done.
+/// The tabs at the lower right: the tools.
 const TOOLS: [Pane; 8] =
     [Pane::Connect, Pane::Target, Pane::Jog, Pane::Taught, Pane::Result, Pane::Verify, Pane::Export, Pane::Track];
 
 /// Share of the height for the images.
 const UPPER: f32 = 0.52;
-/// Share of the lower row's width for the records: the tabs of the tools all fit beside it in the smallest window.
+/// Share of the lower row's width for the records: the tabs of the tools all fit next to it in the smallest window.
 const LOWER_LEFT: f32 = 0.47;
 
 /// A pane in the tree, by name, so that a layout of another version of the program can still be read.
@@ -82,10 +82,10 @@ impl Default for Layout {
 }
 
 impl Layout {
-    /// A layout that was remembered, without the panes that are no longer there and with those that are new.
+    /// A remembered layout, without the panes that no longer exist and with those that are new.
     #[must_use]
     pub fn brought_up_to_date(mut self) -> Self {
-        // What the cell before did not have may be there now.
+        // What the previous cell did not have may be there now.
         let all: Vec<TileId> = self.tree.tiles.tile_ids().collect();
         for id in all {
             self.tree.tiles.set_visible(id, true);
@@ -113,7 +113,7 @@ impl Layout {
         if Pane::ALL.into_iter().all(|pane| self.is_reachable(pane)) { self } else { Self::default() }
     }
 
-    /// Adds a pane to the tabs where its kin are; `false` when there are none.
+    /// Adds a pane to the tabs of its group; `false` if there are none.
     fn add(&mut self, pane: Pane) -> bool {
         let groups = [&IMAGE[..], &SPACE, &RECORDS, &TOOLS];
         let kin: &[Pane] = groups.into_iter().find(|all| all.contains(&pane)).unwrap_or(&[]);
@@ -132,10 +132,10 @@ impl Layout {
         }
     }
 
-    /// Whether a pane hangs on the root.
+    /// Whether a pane is in the tree.
     fn is_reachable(&self, pane: Pane) -> bool {
         let mut at = self.tree.tiles.find_pane(&Slot::from(pane));
-        // A tree that was read from a file may have a ring in it.
+        // A tree that was read from a file may contain a cycle.
         for _ in 0..=self.tree.tiles.len() {
             match at {
                 Some(id) if self.tree.is_root(id) => return true,
@@ -146,7 +146,7 @@ impl Layout {
         false
     }
 
-    /// Leaves out what the cell does not have, and brings it back where another one has it.
+    /// Removes what the cell does not have, and adds it again for a cell that has it.
     pub(crate) fn leave_out(&mut self, model: &Model) {
         let has_depth = model.cell.as_ref().is_none_or(|cell| cell.has_depth) || model.review.is_some();
         for (pane, is_there) in [(Pane::Depth, has_depth), (Pane::Taught, model.moves() != Moves::Never)] {

@@ -1,4 +1,4 @@
-//! Every pane with its name and what draws it. A new one is its name in [`Pane`] and a line here.
+//! Every pane with its name and the function that draws it. A new one needs its name in [`Pane`] and a line here.
 
 use egui::Ui;
 
@@ -26,7 +26,7 @@ pub struct Panes<'a> {
     pub model: &'a Model,
     pub textures: &'a mut Textures,
     pub outbox: &'a mut Outbox,
-    /// The pixel under the pointer, from whichever image it is over.
+    /// The pixel under the pointer, from the image that it is over.
     pub pointed: Option<ImagePoint>,
 }
 
@@ -58,7 +58,7 @@ fn entry(pane: Pane, language: Language) -> (&'static str, Draw) {
     }
 }
 
-/// What is written on its tab.
+/// The title of its tab.
 pub fn title(pane: Pane, language: Language) -> &'static str {
     entry(pane, language).0
 }

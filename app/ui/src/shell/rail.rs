@@ -1,4 +1,4 @@
-//! The steps at the left: what is done, what comes next, and what stands in the way.
+//! The steps at the left: what is done, what comes next, and what is missing.
 
 use egui::{Align2, Color32, CornerRadius, FontId, Rect, Sense, Stroke, Ui, Vec2, WidgetInfo, WidgetType};
 

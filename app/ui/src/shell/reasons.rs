@@ -1,4 +1,4 @@
-//! Why something cannot be done now, as several panes and the palette say it.
+//! Why something cannot be done now, as shown by several panes and the palette.
 
 use handeye_workbench::model::{ArmDoubt, Model};
 use handeye_workbench::tr;
@@ -23,7 +23,7 @@ pub fn unmovable(model: &Model) -> Option<&'static str> {
     }
 }
 
-/// Why the arm's chain of joints is not known, so that nothing can be planned with it; `None` where it is.
+/// Why the arm's chain of joints is not known, so that nothing can be planned with it; `None` if it is.
 pub fn unknown_arm(model: &Model) -> Option<&'static str> {
     let (cell, language) = (model.cell.as_ref(), model.view.language);
     if cell.is_some_and(|cell| cell.arm.is_some()) {

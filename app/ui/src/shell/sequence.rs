@@ -56,7 +56,7 @@ fn begin_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     });
 }
 
-/// The way back to where the arm was first, and of the built-in cell to how all of it was.
+/// The button to return the arm to its initial pose, and to reset the built-in cell.
 pub fn home_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     if model.home.is_some() {
@@ -80,7 +80,7 @@ pub fn home_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     }
 }
 
-/// Which poses were left out, a line for each reason.
+/// Which poses were skipped, one line for each reason.
 pub fn skipped_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence) {
     let mut reasons: Vec<(&Text, Vec<&str>)> = Vec::new();
     for (name, outcome) in sequence.names.iter().zip(&sequence.outcomes) {
@@ -96,8 +96,8 @@ pub fn skipped_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence) {
     }
 }
 
-/// In the pane of the captures: how a sequence of taught poses goes and, where poses were left out or it was broken off, how it went
-/// and what helps.
+/// In the pane of the captures: the progress of a sequence of taught poses and, if poses were skipped or it was interrupted, how it
+/// went and what to do.
 pub fn visits_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &mut Outbox) {
     let is_whole = sequence.outcomes.len() == sequence.names.len()
         && sequence.outcomes.iter().all(|outcome| *outcome == StopOutcome::Done);
@@ -109,7 +109,7 @@ pub fn visits_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &m
     ui.horizontal_wrapped(|ui| home_ui(ui, model, outbox));
 }
 
-/// How far it is, and the button that ends it.
+/// Its progress, and the button that ends it.
 pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &mut Outbox) {
     let language = model.view.language;
     let (done, of) = (sequence.outcomes.len(), sequence.names.len());
@@ -124,7 +124,7 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: 
     asked_ui(ui, model, outbox);
 }
 
-/// How the last one went, and the button that goes on with it where poses are left.
+/// How the last one went, and the button to continue it if poses are left.
 pub fn summary_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &mut Outbox) {
     parts::hint_ui(ui, &went(sequence).in_language(model.view.language));
     continue_ui(ui, model, sequence, outbox);
@@ -143,7 +143,7 @@ fn went(sequence: &PoseSequence) -> Text {
     )
 }
 
-/// The button that goes on with a sequence that was broken off.
+/// The button that continues an interrupted sequence.
 pub fn continue_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &mut Outbox) {
     let language = model.view.language;
     if !sequence.can_continue() {

@@ -22,12 +22,12 @@ const LINES: f32 = 34.0;
 /// As wide as a joint value gets.
 const WIDEST_ANGLE: &str = "−888.8";
 
-/// So long \[s\] something that went as asked is news.
+/// For this long \[s\] a success counts as news.
 const FRESH_S: f64 = 30.0;
 
 pub fn status_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let palette = Palette::of(ui);
-    // What is on the screen after a loss is history, and looks like it.
+    // What is on the screen after a loss of connection is outdated, and looks like it.
     let language = model.view.language;
     let robot_age = robot_age(model);
     let live = robot_age.is_none();
@@ -80,7 +80,7 @@ fn field_ui(ui: &mut Ui, caption: &str, value: &str, sample: &str, colour: egui:
     let room = ui.painter().layout_no_wrap(sample.to_owned(), font, colour).size().x;
     ui.vertical(|ui| {
         ui.spacing_mut().item_spacing.y = 1.0;
-        // Nothing moves sideways when a number grows or is not known.
+        // Nothing shifts sideways when a number grows or is not known.
         ui.set_min_width(room);
         ui.label(RichText::new(caption).size(CAPTION).color(weak));
         let label = ui.add(Label::new(RichText::new(value).color(colour)).extend().sense(Sense::hover()));
@@ -136,7 +136,7 @@ fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut O
     });
 }
 
-/// What is under way, or else what went as asked a moment ago. The log has all of it.
+/// What is under way, or else the last recent success. The log has all of it.
 fn message_ui(ui: &mut Ui, model: &Model) {
     let palette = Palette::of(ui);
     let language = model.view.language;
@@ -149,7 +149,7 @@ fn message_ui(ui: &mut Ui, model: &Model) {
     ui.add(Label::new(RichText::new(reported).color(colour)).truncate());
 }
 
-/// What the program does now, what was asked for before what comes of it.
+/// What the program does now; user requests come before their consequences.
 fn under_way(model: &Model) -> Option<Text> {
     if model.planning {
         return Some(text!("Planning poses that are not in the fit…"));
@@ -186,7 +186,7 @@ fn under_way(model: &Model) -> Option<Text> {
     }
 }
 
-/// Those of the arm, or of a usual one as long as there is none.
+/// The joint count of the arm, or of a typical one as long as there is none.
 fn joint_count(model: &Model) -> usize {
     model.robot.as_ref().map_or(6, |robot| robot.joints_rad.len())
 }
@@ -206,7 +206,7 @@ fn joints_shown(model: &Model, robot: &RobotState) -> String {
     numbers::row(&robot.joints_rad.iter().enumerate().map(shown).collect::<Vec<_>>(), 1, 6)
 }
 
-/// Tenths while it is young, so that it does not flicker.
+/// With tenths only while it is small, so that it does not flicker.
 fn age_text(age_s: f64) -> String {
     if age_s < 60.0 { format!("{age_s:.1} s") } else { format!("{:.0} min", age_s / 60.0) }
 }

@@ -46,7 +46,7 @@ pub fn tiles_ui(ui: &mut Ui, model: &Model, textures: &mut Textures, layout: &mu
     ui.painter().set(behind, Shape::Vec(cards.collect()));
 }
 
-/// Height of a row of tabs: fingers need more.
+/// Height of a row of tabs: more for touch input.
 fn tabs_height(spacing: &Spacing) -> f32 {
     TABS.max(spacing.interact_size.y)
 }
@@ -54,7 +54,7 @@ fn tabs_height(spacing: &Spacing) -> f32 {
 impl Behavior<Slot> for Panes<'_> {
     fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, slot: &mut Slot) -> UiResponse {
         if let Some(pane) = slot.pane() {
-            // Nothing of a pane may lie on the edge of its card.
+            // No part of a pane may touch the edge of its card.
             let inside = ui.max_rect().shrink(1.0);
             ui.scope_builder(egui::UiBuilder::new().max_rect(inside).id_salt(pane), |ui| {
                 ui.set_clip_rect(ui.clip_rect().intersect(inside));
@@ -67,7 +67,7 @@ impl Behavior<Slot> for Panes<'_> {
     fn tab_title_for_pane(&mut self, slot: &Slot) -> WidgetText {
         let language = self.model.view.language;
         match slot.pane() {
-            // A robot that is only read is not jogged.
+            // A read-only robot is not jogged.
             Some(Pane::Jog) if self.model.moves() == Moves::Never => tr!(language, "Robot"),
             pane => pane.map_or("", |pane| panes::title(pane, language)),
         }
@@ -79,7 +79,7 @@ impl Behavior<Slot> for Panes<'_> {
         let title = self.tab_title_for_tile(tiles, tile);
         let font = FontId::new(13.0, if state.active { fonts::semibold() } else { egui::FontFamily::Proportional });
         let galley = title.into_galley(ui, Some(egui::TextWrapMode::Extend), f32::INFINITY, font);
-        // As wide as with the heavier letters of the tab in front, so that choosing a tab moves none.
+        // As wide as with the heavier letters of the tab in front, so that selecting a tab does not shift the others.
         let width = {
             let heavy = FontId::new(13.0, fonts::semibold());
             let galley = ui.painter().layout_no_wrap(galley.text().to_owned(), heavy, palette.text);

@@ -63,7 +63,7 @@ fn connection_ui(ui: &mut Ui, status: &Status, language: Language) {
     let colour = palette.tone(status.tone);
     ui.painter().circle_filled(rect.center(), 6.0, colour.gamma_multiply(0.25));
     ui.painter().circle_filled(rect.center(), 4.0, colour);
-    // What stands to the right of it keeps its room.
+    // The widgets to the right of it keep their room.
     let room = (ui.available_width() - 230.0).max(60.0);
     ui.scope(|ui| {
         ui.set_max_width(room);
@@ -139,7 +139,7 @@ fn history_ui(
 
 fn stop_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let face = Face::of(ui, model, tr!(model.view.language, "STOP"));
-    // All that it says has room in it, so that it keeps its place.
+    // All its texts have room in it, so that it keeps its place.
     let letters = if face.can_act { 13.5 } else { 11.0 };
     let button = Button::new(theme::title(face.words, letters).color(face.ink))
         .fill(face.fill)

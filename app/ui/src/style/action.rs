@@ -1,4 +1,4 @@
-//! The buttons for what a status asks a person to do.
+//! The buttons for what a status asks the user to do.
 
 use egui::Ui;
 

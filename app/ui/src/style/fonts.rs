@@ -1,4 +1,5 @@
-//! The fonts of the window: Inter for Latin, Noto Sans SC for Chinese, and behind them the signs that come with egui.
+//! The fonts of the window: Inter for Latin, Noto Sans SC for Chinese, and as a fallback the symbols that come with
+//! egui.
 
 use std::sync::Arc;
 
@@ -41,7 +42,7 @@ pub fn definitions() -> FontDefinitions {
     fonts
 }
 
-/// Whether the fonts are there; they are from the second frame after [`super::theme::install`] on.
+/// Whether the fonts are loaded; they are from the second frame after [`super::theme::install`] on.
 pub fn are_there(ctx: &egui::Context) -> bool {
     ctx.fonts(|fonts| fonts.definitions().families.contains_key(&semibold()))
 }

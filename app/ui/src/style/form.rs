@@ -51,7 +51,7 @@ pub fn note_ui(ui: &mut Ui, tone: Tone, title: &str, detail: &str) {
     });
 }
 
-/// Buttons side by side of which one is on; gives the one that was clicked.
+/// Buttons side by side, one of which is on; returns the one that was clicked.
 pub fn choice_ui<T: Copy + PartialEq>(ui: &mut Ui, current: T, choices: &[(T, &str, &str)]) -> Option<T> {
     let palette = Palette::of(ui);
     let mut clicked = None;

@@ -1,10 +1,10 @@
-//! Small signs that are drawn, not written, so that they are crisp and alike in every font.
+//! Small icons that are drawn, so that they are crisp and the same with every font.
 
 use std::f32::consts::PI;
 
 use egui::{Color32, Painter, Pos2, Rect, Shape, Stroke, Vec2};
 
-/// A sign.
+/// An icon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Icon {
     /// Three bars.

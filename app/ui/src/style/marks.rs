@@ -6,21 +6,21 @@ use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, Vec2};
 use super::theme::Palette;
 use handeye_geometry::depth::ColourMap;
 
-/// Colours with a meaning of their own, besides the [`Palette`].
+/// Colours with a meaning of their own, in addition to the [`Palette`].
 #[derive(Debug, Clone, Copy)]
 pub struct Marks {
     /// Captures that enter the fit.
     pub fit: Color32,
     /// Captures that verify it.
     pub verify: Color32,
-    /// Captures that were taken out.
+    /// Captures that the user excluded.
     pub excluded: Color32,
-    /// The board where the calibration says that it is.
+    /// The board where the calibration predicts it.
     pub predicted: Color32,
-    /// The board at a pose that the arm goes to next.
+    /// The board at a pose that the arm moves to next.
     pub planned: Color32,
     pub residual: Color32,
-    /// What is drawn of a recorded image, so that nobody takes it for the live one.
+    /// What is drawn of a recorded image, to distinguish it from the live one.
     pub review: Color32,
     /// Text on `review`.
     pub on_review: Color32,
@@ -30,7 +30,7 @@ pub struct Marks {
     pub axes: [Color32; 3],
     /// A point that was picked.
     pub picked: Color32,
-    /// Where a simulated cell says that something is.
+    /// Where something is according to a simulated cell.
     pub truth: Color32,
 }
 
@@ -75,18 +75,18 @@ const OVER_IMAGES: Marks = Marks {
 };
 
 impl Marks {
-    /// Those on the surfaces of the theme that `ui` is drawn in.
+    /// The colours on the surfaces of the theme that `ui` is drawn in.
     pub fn of(ui: &Ui) -> &'static Self {
         if ui.visuals().dark_mode { &DARK } else { &LIGHT }
     }
 
-    /// Those over images.
+    /// The colours over images.
     pub fn over_images() -> &'static Self {
         &OVER_IMAGES
     }
 }
 
-/// Draws over an image what can be seen on any ground: a dark line under the coloured one.
+/// Draws a line over an image that is visible on any background: a dark line under the coloured one.
 pub fn outlined_line(painter: &Painter, points: &[Pos2], width: f32, colour: Color32) {
     if points.len() < 2 {
         return;
@@ -103,13 +103,13 @@ pub fn of_board_row(row: usize, rows: usize) -> Color32 {
     super::theme::pixel(ColourMap::Turbo.colour(part))
 }
 
-/// A few words on a dark plate, readable over any image; gives where it is.
+/// A few words on a dark plate, readable over any image; returns where it is.
 pub fn plate(painter: &Painter, at: Pos2, words: &str, colour: Color32) -> Rect {
     plate_at(painter, (Align2::LEFT_TOP, at), words, super::theme::CAPTION, colour)
 }
 
-/// The same with letters of a size, and with another of its corners at the point. All of the words are inside what the painter
-/// may paint on: in lines where one is too long, and moved where it would go over the edge.
+/// The same with a font size, and with a chosen corner at the point. The whole text is inside the painter's clip rectangle:
+/// wrapped if too long, and shifted if it would cross the edge.
 pub fn plate_at(painter: &Painter, (corner, at): (Align2, Pos2), words: &str, size: f32, colour: Color32) -> Rect {
     const INSET: Vec2 = Vec2::new(6.0, 3.0);
     /// Distance to the edge.
@@ -124,7 +124,7 @@ pub fn plate_at(painter: &Painter, (corner, at): (Align2, Pos2), words: &str, si
     job.halign = corner.x();
     let galley = painter.layout_job(job);
     let mut rect = corner.anchor_size(at, galley.size() + 2.0 * INSET);
-    // What is about something out of sight stays there with it.
+    // A label of something out of view stays out of view.
     if room.contains(at) {
         let over = (rect.max - room.max).max(Vec2::ZERO) - (room.min - rect.min).max(Vec2::ZERO);
         rect = rect.translate(-over);
@@ -135,7 +135,7 @@ pub fn plate_at(painter: &Painter, (corner, at): (Align2, Pos2), words: &str, si
     rect
 }
 
-/// The colour of a capture by what it is for.
+/// The colour of a capture by its purpose.
 pub fn of_capture(marks: &Marks, excluded: bool, verifies: bool) -> Color32 {
     match (excluded, verifies) {
         (true, _) => marks.excluded,
@@ -161,7 +161,7 @@ pub fn nothing_yet_ui(ui: &mut Ui, title: &str, detail: &str) {
     nothing_yet_but_ui(ui, title, detail, 60.0, |_| ());
 }
 
-/// The same, with what else can be done below it; `height` is about that of all of it.
+/// The same, with what else can be done below it; `height` is the approximate height of all of it.
 pub fn nothing_yet_but_ui(ui: &mut Ui, title: &str, detail: &str, height: f32, more_ui: impl FnOnce(&mut Ui)) {
     const TEXT_WIDTH: f32 = 440.0;
     let palette = Palette::of(ui);

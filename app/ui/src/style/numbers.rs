@@ -1,5 +1,5 @@
-//! Numbers as text, always of the same width so that they do not dance: the fonts have digits of equal width, and what
-//! pads them is as wide as a digit.
+//! Numbers as text, always of the same width so that they do not jump: the fonts have digits of equal width, and the
+//! padding is as wide as a digit.
 
 use handeye_geometry::frames::{Base, Pose};
 
@@ -15,13 +15,13 @@ pub fn fixed(value: f64, decimals: usize, width: usize) -> String {
     format!("{}{text}", FIGURE_SPACE.repeat(padding))
 }
 
-/// Several numbers in a row, so far apart that two which fill their width are still two.
+/// Several numbers in a row, with enough distance to separate two that fill their width.
 pub fn row(values: &[f64], decimals: usize, width: usize) -> String {
     let between = format!("{FIGURE_SPACE} ");
     values.iter().map(|&value| fixed(value, decimals, width)).collect::<Vec<_>>().join(&between)
 }
 
-/// An error in millimetres: hundredths, and thousandths of what is below a tenth.
+/// An error in millimetres: with hundredths, or with thousandths below a tenth.
 pub fn error_mm(metres: f64) -> String {
     let mm = metres * 1e3;
     if mm < 0.1 { format!("{mm:.3}") } else { format!("{mm:.2}") }

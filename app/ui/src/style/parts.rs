@@ -1,4 +1,4 @@
-//! Small parts that panes share: sections, stated numbers, notices, and signs that need no font.
+//! Small parts that panes share: sections, stated numbers, notices, and icons that need no font.
 
 use egui::{
     Align, Button, CornerRadius, Frame, Id, Label, Layout, Margin, ProgressBar, Response, RichText, ScrollArea, Sense,
@@ -11,7 +11,7 @@ use handeye_workbench::tr;
 
 /// Width of the captions in front of numbers.
 const CAPTIONS: f32 = 128.0;
-/// Size of buttons that carry a sign.
+/// Size of buttons with an icon.
 const SIGN_BUTTON: f32 = 24.0;
 
 /// The body of a pane: scrolls when its tile is small.
@@ -30,7 +30,7 @@ pub(crate) fn section_ui(ui: &mut Ui, title: &str) {
     section_with_ui(ui, title, |_| ());
 }
 
-/// A heading, and what stands beside it.
+/// A heading, and what is next to it.
 pub(crate) fn section_with_ui(ui: &mut Ui, title: &str, beside_ui: impl FnOnce(&mut Ui)) {
     ui.add_space(6.0);
     ui.horizontal(|ui| {
@@ -45,7 +45,7 @@ pub(crate) fn hint_ui(ui: &mut Ui, text: &str) {
     ui.add(Label::new(RichText::new(text).color(weak)).wrap());
 }
 
-/// What a pane shows when it has nothing to show, and what to do about it.
+/// What an empty pane shows, and what to do about it.
 pub(crate) fn empty_ui(ui: &mut Ui, title: &str, detail: &str) {
     let palette = Palette::of(ui);
     ui.add_space(14.0);
@@ -82,7 +82,7 @@ pub(crate) fn stated_ui(ui: &mut Ui, caption: &str, value: &str) -> Response {
 /// The same in a colour.
 pub(crate) fn stated_in_ui(ui: &mut Ui, caption: &str, value: &str, colour: egui::Color32) -> Response {
     ui.scope(|ui| {
-        // Numbers stand closer than controls do.
+        // Numbers are closer together than controls.
         ui.spacing_mut().interact_size.y = 18.0;
         row_ui(ui, caption, |ui| value_ui(ui, caption, value, colour))
     })
@@ -93,11 +93,11 @@ pub(crate) fn stated_in_ui(ui: &mut Ui, caption: &str, value: &str, colour: egui
 pub(crate) fn stated_width(ui: &Ui, value: &str) -> f32 {
     let font = egui::TextStyle::Monospace.resolve(ui.style());
     let value = ui.painter().layout_no_wrap(value.to_owned(), font, egui::Color32::WHITE).size().x;
-    // A point for rounding.
+    // One extra point for rounding.
     CAPTIONS + ui.spacing().item_spacing.x + value + 1.0
 }
 
-/// A value in figures of one width, with the caption that a screen reader says before it.
+/// A value in digits of equal width, with the caption that a screen reader reads before it.
 pub(crate) fn value_ui(ui: &mut Ui, caption: &str, value: &str, colour: egui::Color32) -> Response {
     let label = ui.add(Label::new(RichText::new(value).monospace().color(colour)).wrap().sense(Sense::hover()));
     label.widget_info(|| {
@@ -132,12 +132,13 @@ pub(crate) fn dot_ui(ui: &mut Ui, colour: egui::Color32) {
     ui.painter().circle_filled(rect.center(), 4.0, colour);
 }
 
-/// A button that does nothing while there is a reason, which it then says.
+/// A button that is disabled while there is a reason, which is then its tooltip.
 pub(crate) fn gated_ui(ui: &mut Ui, reason: Option<&str>, button: Button<'_>) -> Response {
     ui.add_enabled(reason.is_none(), button).on_disabled_hover_text(reason.unwrap_or_default())
 }
 
-/// A bar of progress, 0 to 1, with what it says aloud and a button that ends it; tells whether that was clicked.
+/// A progress bar, 0 to 1, with the text for screen readers and a button that ends it; returns whether that was
+/// clicked.
 pub(crate) fn progress_ui(ui: &mut Ui, part: f32, reported: &str, end: &str) -> bool {
     ui.label(RichText::new(reported).color(Palette::of(ui).text));
     ui.horizontal(|ui| {
@@ -153,7 +154,7 @@ pub(crate) fn progress_ui(ui: &mut Ui, part: f32, reported: &str, end: &str) -> 
     .inner
 }
 
-/// A button that puts a text on the clipboard; `what` tells it from others.
+/// A button that copies a text to the clipboard; `what` distinguishes it from others.
 pub(crate) fn copy_ui(ui: &mut Ui, language: Language, what: &str, text: impl FnOnce() -> String) {
     let response = ui.add(small_button(ui, tr!(language, "Copy")));
     let reported = handeye_wording::text!("Copy {what}", what = what).in_language(language);
@@ -163,25 +164,25 @@ pub(crate) fn copy_ui(ui: &mut Ui, language: Language, what: &str, text: impl Fn
     }
 }
 
-/// Signs of small buttons.
+/// Icons of small buttons.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Sign {
     /// Towards the top.
     Up,
     /// Towards the bottom.
     Down,
-    /// Away with it.
+    /// Remove.
     Cross,
-    /// Here it can be dragged.
+    /// Drag handle.
     Grip,
 }
 
-/// A button that stands in a line of text, and is as large as others where it is pressed with a finger.
+/// A button in a line of text, which is as large as others for touch input.
 pub(crate) fn small_button<'a>(ui: &Ui, words: impl Into<egui::WidgetText>) -> Button<'a> {
     Button::new(words.into()).small().min_size(theme::least(ui, 0.0, 0.0))
 }
 
-/// A button with a sign, which has a name for those who cannot see it.
+/// A button with an icon, which has a name for screen readers.
 pub(crate) fn sign_ui(ui: &mut Ui, sign: Sign, name: &str, enabled: bool) -> Response {
     let sense = if sign == Sign::Grip { Sense::drag() } else { Sense::click() };
     let button = Button::new("")
@@ -219,7 +220,7 @@ pub(crate) fn sign_ui(ui: &mut Ui, sign: Sign, name: &str, enabled: bool) -> Res
     response.on_hover_text(name)
 }
 
-/// What a pane remembers between frames, none of which matters to anybody else.
+/// What a pane remembers between frames, for its own use only.
 pub fn remembered<T: 'static + Clone + Default + Send + Sync>(ui: &Ui, id: Id) -> T {
     ui.data(|data| data.get_temp(id)).unwrap_or_default()
 }

@@ -14,11 +14,11 @@ pub(crate) const CARD_RADIUS: u8 = 8;
 /// Distance between cards, and from cards to the edge.
 pub(crate) const GAP: f32 = 8.0;
 
-/// Height of what is pressed with a pointer \[points\].
+/// Height of controls for a pointer \[points\].
 const POINTER: f32 = 26.0;
 /// Between the edge of a button and its words \[points\].
 const PADDING: Vec2 = Vec2::new(10.0, 4.0);
-/// Least width and height of what is pressed with a finger \[points\].
+/// Minimum width and height of controls for touch input \[points\].
 pub(crate) const FINGER: f32 = 40.0;
 
 /// Colours with a meaning.
@@ -45,7 +45,7 @@ pub struct Palette {
     pub good: Color32,
     /// It is being worked on.
     pub busy: Color32,
-    /// Look here soon.
+    /// Needs attention soon.
     pub warning: Color32,
     /// It failed; stop.
     pub bad: Color32,
@@ -153,7 +153,7 @@ impl Palette {
         }
     }
 
-    /// A surface that is one step above the cards: fields, hovered rows.
+    /// A surface one step above the cards: fields, hovered rows.
     pub(crate) fn raised(&self) -> Color32 {
         self.card.lerp_to_gamma(self.text, 0.05)
     }
@@ -174,19 +174,19 @@ pub fn pixel([red, green, blue]: [u8; 3]) -> Color32 {
     Color32::from_rgb(red, green, blue)
 }
 
-/// A title: semibold where the language has it.
+/// A title: semibold if the language has it.
 pub fn title(text: impl Into<String>, size: f32) -> RichText {
     RichText::new(text).font(FontId::new(size, fonts::semibold()))
 }
 
-/// Sets up fonts and both themes; once. The fonts are there from the next frame on.
+/// Sets up fonts and both themes; once. The fonts are available from the next frame on.
 pub fn install(ctx: &egui::Context) {
     ctx.set_fonts(fonts::definitions());
     ctx.style_mut_of(egui::Theme::Dark, |style| shape(style, Visuals::dark(), &DARK));
     ctx.style_mut_of(egui::Theme::Light, |style| shape(style, Visuals::light(), &LIGHT));
 }
 
-/// Makes what is pressed large enough for fingers, or as large as a pointer needs it.
+/// Makes controls large enough for fingers, or as large as a pointer needs.
 pub fn for_fingers(ctx: &egui::Context, fingers: bool) {
     let (height, padding) = if fingers { (FINGER, Vec2::splat(12.0)) } else { (POINTER, PADDING) };
     ctx.all_styles_mut(|style| {
@@ -203,12 +203,12 @@ pub fn choose(ctx: &egui::Context, theme: ThemeChoice) {
     });
 }
 
-/// Whether what is pressed is made for fingers now.
+/// Whether controls are sized for fingers now.
 pub(crate) fn is_for_fingers(ui: &egui::Ui) -> bool {
     ui.ctx().global_style().spacing.interact_size.y >= FINGER
 }
 
-/// The least size of something that is pressed: this one with a pointer, and never less than a finger hits.
+/// The minimum size of a control: this one with a pointer, and never less than a finger can hit.
 pub fn least(ui: &egui::Ui, width: f32, height: f32) -> Vec2 {
     let finger = if is_for_fingers(ui) { FINGER } else { 0.0 };
     Vec2::new(width, height).max(Vec2::splat(finger))

@@ -1,4 +1,4 @@
-//! Which board is looked at: its kind and its numbers, how it looks, and the way to paper.
+//! The board that is searched for: its kind and its numbers, how it looks, and printing it.
 
 use egui::{Button, ComboBox, DragValue, Id, Ui, Vec2, WidgetInfo, WidgetType};
 use handeye_geometry::targets::{AprilGrid, AprilTag, Charuco, Dictionary, Grid, IdOrder, Layout, TargetSpec};
@@ -14,13 +14,13 @@ use handeye_workbench::target;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
-/// Points of a board along one side: what people print.
+/// Points of a board along one side: what is usually printed.
 const POINTS: std::ops::RangeInclusive<usize> = 3..=40;
 /// Tags of a board along one side.
 const TAGS: std::ops::RangeInclusive<usize> = 1..=20;
 /// A length on a board \[mm\].
 const LENGTH_MM: std::ops::RangeInclusive<f64> = 0.5..=500.0;
-/// Least width that the drawing of the board needs beside the numbers.
+/// Minimum width that the drawing of the board needs next to the numbers.
 const BESIDE: f32 = 520.0;
 
 /// Kinds of boards: all that can be detected.
@@ -60,7 +60,8 @@ impl Kind {
         }
     }
 
-    /// One of this kind to begin with, which fits on A4; with the numbers of the board before where both are a lattice.
+    /// A target of this kind to start with, which fits on A4; with the numbers of the previous board if both are a
+    /// lattice.
     fn first(self, before: &TargetSpec) -> TargetSpec {
         let grid = match before {
             TargetSpec::Chessboard(grid) | TargetSpec::Circles(grid) | TargetSpec::AsymmetricCircles(grid) => *grid,
@@ -70,7 +71,7 @@ impl Kind {
         match self {
             Self::Chessboard => TargetSpec::Chessboard(grid),
             Self::Circles => TargetSpec::Circles(grid),
-            // The rows are half as far apart as the dots in them, and the odd number of rows tells its ends apart.
+            // The rows are half as far apart as the dots in them, and the odd number of rows distinguishes its ends.
             Self::AsymmetricCircles => TargetSpec::AsymmetricCircles(Grid { columns: 4, rows: 11, square_m: 0.018 }),
             Self::Charuco => TargetSpec::Charuco(Charuco {
                 columns: 6,
@@ -129,7 +130,7 @@ pub fn board_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     print_ui(ui, language, outbox);
 }
 
-/// What to count, and what is told from the images.
+/// What to count, and what is found from the images.
 fn hint(target: &TargetSpec) -> handeye_wording::Text {
     match target {
         TargetSpec::Chessboard(grid) => text!(
@@ -187,7 +188,7 @@ fn numbers_ui(ui: &mut Ui, target: &TargetSpec, language: Language, outbox: &mut
     }
     let key = Id::new("why the board cannot be");
     if wanted != *target {
-        // A board that cannot be is not looked for; the one before stays, with what was wrong.
+        // An invalid board is not looked for; the previous one stays, with the error shown.
         let refused = wanted.check().err().map(|why| why.to_string());
         if refused.is_none() {
             outbox.send(target::Command::Set(wanted));
@@ -285,7 +286,7 @@ fn length_ui(ui: &mut Ui, name: &str, metres: &mut f64, language: Language) {
             "Measure it on the print: printers scale. An error of 1 % here is an error of 1 % in every distance"
         ));
     });
-    // Only what was changed is written back, so that what was read keeps its last digit.
+    // Only what was changed is written back, so that a value read from a file keeps its last digit.
     if mm != *metres * 1e3 {
         *metres = mm * 1e-3;
     }
@@ -333,7 +334,7 @@ mod tests {
     use handeye_workbench::command::Command;
     use handeye_workbench::testing::sample;
 
-    /// Chooses from a list; gives the board that is asked for.
+    /// Chooses from a list; returns the requested board.
     fn chosen(pane: &mut Driven, list: &str, entry: &str) -> Option<TargetSpec> {
         pane.harness.get_by_role_and_label(Role::ComboBox, list).click();
         pane.steps();
@@ -356,7 +357,7 @@ mod tests {
     #[test]
     fn every_kind_that_can_be_detected_is_chosen_with_its_numbers_and_fits_on_a4() {
         let mut pane = Driven::new(target_ui, sample::connected());
-        // The kind that is there comes last: choosing it again would change nothing.
+        // The present kind comes last: choosing it again would change nothing.
         for (name, field) in [
             ("ChArUco", "Marker family"),
             ("AprilTag board", "Gap"),

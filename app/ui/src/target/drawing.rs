@@ -11,7 +11,7 @@ use crate::style::theme::{CAPTION, Palette};
 use handeye_wording::text;
 use handeye_workbench::text::Language;
 
-/// What was drawn last: codes of markers take their time to look up.
+/// What was drawn last: looking up codes of markers takes time.
 #[derive(Clone, Default)]
 struct Kept(Option<(TargetSpec, Option<Arc<Drawing>>)>);
 

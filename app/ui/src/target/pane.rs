@@ -1,4 +1,4 @@
-//! What is looked at, where the camera sits, and what is known of it.
+//! The target, where the camera is mounted, and what is known about it.
 
 use egui::{DragValue, Ui};
 use handeye_dataset::CameraInput;
@@ -53,12 +53,12 @@ fn mode_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     );
 }
 
-/// A number of pixels as it is shown or typed.
+/// A number of pixels as shown or typed.
 fn pixels(text: &str) -> Option<f64> {
     text.trim().trim_start_matches('±').trim_end_matches("px").trim().parse().ok()
 }
 
-/// Intrinsics that are worse are better estimated, pixels.
+/// Intrinsics with a larger error should be estimated instead, pixels.
 const MOST_PX: f64 = 20.0;
 
 fn camera_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
@@ -120,7 +120,7 @@ fn camera_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
              sheet or another program. The expected error counts it. At 0 they are taken as exact."
         ));
     });
-    // Less is exact, and shown so.
+    // A smaller value counts as exact, and is shown as such.
     let accuracy = Some(accuracy).filter(|px| px >= LENS_ACCURACY_PX.start());
     if now != before || accuracy != accuracy_px {
         let known = CameraInput { fixed: true, accuracy_px: accuracy, intrinsics: Some(now), model: now.distortion };
@@ -162,7 +162,8 @@ fn lens_ui(ui: &mut Ui, camera: &mut Intrinsics, language: Language) {
     camera.distortion = camera.distortion.with_coefficients(&coefficients);
 }
 
-/// Where entering intrinsics starts: what the cell says of its camera, or else a lens of 57° for the picture at hand.
+/// Where entering intrinsics starts: what the cell reports about its camera, or else a lens of 57° for the present
+/// image.
 fn start(model: &Model) -> Intrinsics {
     if let Some(nominal) = model.cell.as_ref().and_then(|cell| cell.nominal_intrinsics) {
         return nominal;

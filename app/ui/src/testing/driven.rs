@@ -13,14 +13,14 @@ pub(crate) type PaneUi = fn(&mut Ui, &Model, &mut Outbox);
 /// Nothing has to be scrolled to.
 const HEIGHT: f32 = 2400.0;
 
-/// The pane with its model and what it asks for.
+/// The pane with its model and its commands.
 pub(crate) struct Driven {
     /// Draws it.
     pub harness: Harness<'static, (Model, Outbox)>,
 }
 
 impl Driven {
-    /// As wide as a tile, and so high that nothing has to be scrolled to.
+    /// As wide as a tile, and high enough that nothing has to be scrolled to.
     pub(crate) fn new(pane: PaneUi, model: Model) -> Self {
         let harness = Harness::builder().with_size(vec2(420.0, HEIGHT)).build_ui_state(
             move |ui, (model, outbox): &mut (Model, Outbox)| {
@@ -46,7 +46,7 @@ impl Driven {
         self.steps();
     }
 
-    /// Draws until what was done shows.
+    /// Draws until the change is visible.
     pub(crate) fn steps(&mut self) {
         self.harness.run_steps(3);
     }
@@ -56,7 +56,7 @@ impl Driven {
         &mut self.harness.state_mut().0
     }
 
-    /// What was asked for since the last time.
+    /// The commands since the last call.
     pub(crate) fn commands(&mut self) -> Vec<Command> {
         self.harness.state_mut().1.drain().map(|(command, _)| command).collect()
     }
@@ -71,7 +71,7 @@ impl Driven {
         !self.harness.get_by_label(label).accesskit_node().is_disabled()
     }
 
-    /// Clicks a control and gives what it asks for.
+    /// Clicks a control and returns its commands.
     pub(crate) fn click(&mut self, label: &str) -> Vec<Command> {
         self.commands();
         self.harness.get_by_label(label).click();
@@ -97,7 +97,7 @@ impl Driven {
         self.steps();
     }
 
-    /// Presses and releases a key, and gives what it asks for.
+    /// Presses and releases a key, and returns its commands.
     pub(crate) fn press(&mut self, key: egui::Key) -> Vec<Command> {
         self.commands();
         self.harness.key_press(key);

@@ -25,7 +25,7 @@ use handeye_workbench::worker::fake::FakeCell;
 use handeye_workbench::worker::{Cell, Clock, PortError, Waker};
 use handeye_workbench::{connect, live, shell};
 
-/// The window over workers that have nothing to say: the tests are the only ones that report.
+/// The window over workers that report nothing: only the tests report.
 pub struct Silent {
     /// The window, driven by labels.
     pub harness: Harness<'static, Window>,
@@ -38,7 +38,7 @@ pub struct Silent {
 pub const SIZE: Vec2 = vec2(1440.0, 900.0);
 
 impl Silent {
-    /// With a cell that is not there yet.
+    /// With a cell that is not connected yet.
     pub(crate) fn new(source: CellSource) -> Self {
         Self::of_size(source, SIZE)
     }
@@ -48,7 +48,7 @@ impl Silent {
         Self::built(source, Harness::builder().with_size(size))
     }
 
-    /// The same in a harness that is set up otherwise, as to make images.
+    /// The same in a harness with another set-up, such as for images.
     pub(crate) fn built(source: CellSource, builder: HarnessBuilder<Window>) -> Self {
         let (cell, release) = FakeCell::that_never_answers();
         // The workers fail once and then wait for the user, so that nothing comes from them.
@@ -70,7 +70,7 @@ impl Silent {
             in_browser: None,
         };
         let mut app = App::start(start, connect, clock, waker).expect("threads");
-        // The fake's line for motions refuses nobody; it has nothing to report once it is there.
+        // The fake's connection for motions is never refused; it has nothing to report once connected.
         let settled = |app: &App| {
             let failed = |link| matches!(app.model().link(link), LinkState::Failed { .. });
             let prepared = !app.model().document().meta.created.is_empty();
@@ -93,12 +93,12 @@ impl Silent {
         silent
     }
 
-    /// Draws until what was done shows.
+    /// Draws until the change is visible.
     pub(crate) fn steps(&mut self) {
         self.harness.run_steps(3);
     }
 
-    /// Waits until what the archive and the other threads do shows in the model.
+    /// Waits until the work of the archive and the other threads is visible in the model.
     pub(crate) fn until(&mut self, what: &str, is_so: impl Fn(&Model) -> bool) {
         let deadline = Instant::now() + Duration::from_secs(30);
         loop {
@@ -108,7 +108,7 @@ impl Silent {
             }
             let left = deadline.saturating_duration_since(Instant::now());
             assert!(!left.is_zero(), "waiting for {what}");
-            // A report may have come between the look and the wait: the next look is soon in any case.
+            // A report may have come between the check and the wait: the next check is soon in any case.
             let _woken = self.woken.recv_timeout(left.min(Duration::from_millis(50))).is_ok();
         }
     }
@@ -142,7 +142,7 @@ impl Silent {
         self.harness.query_all_by_label_contains(part).count() > 0
     }
 
-    /// Does what a pane would ask for.
+    /// Sends a command as a pane would.
     pub(crate) fn command(&mut self, command: impl Into<Command>) {
         self.harness.state_mut().apply(command);
         self.steps();
@@ -159,7 +159,7 @@ impl Silent {
         self.steps();
     }
 
-    /// Clicks what has a label.
+    /// Clicks the widget with a label.
     pub(crate) fn click(&mut self, label: &str) {
         self.harness.get_by_label(label).scroll_to_me();
         self.steps();

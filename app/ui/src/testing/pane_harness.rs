@@ -9,7 +9,7 @@ use crate::style::theme;
 use handeye_workbench::command::{Command, Outbox};
 use handeye_workbench::model::{ImagePoint, Model};
 
-/// What a pane is drawn from, and what comes out of it.
+/// What a pane is drawn from, and its output.
 pub(crate) struct PaneState {
     /// What it shows.
     pub model: Model,
@@ -53,7 +53,7 @@ impl PaneHarness {
         self.harness.run_steps(3);
     }
 
-    /// What the user wanted since this was last asked.
+    /// The commands since the last call.
     pub(crate) fn commands(&mut self) -> Vec<Command> {
         self.harness.state_mut().outbox.drain().map(|(command, _)| command).collect()
     }
@@ -68,7 +68,7 @@ impl PaneHarness {
         self.harness.query_all_by_label_contains(words).count() > 0
     }
 
-    /// Clicks on what has this label; gives what comes of it.
+    /// Clicks the widget with this label; returns the commands.
     pub(crate) fn click(&mut self, label: &str) -> Vec<Command> {
         self.commands();
         self.harness.get_by_label(label).click();

@@ -43,7 +43,7 @@ pub struct DescribedTarget {
     /// Family of tags [default: apriltag_36h11].
     #[arg(long, value_name = "NAME", help_heading = heading::TAGS)]
     family: Option<Dictionary>,
-    /// Width of the black border of tags in bits [default: 2 on boards, as in Kalibr, 1 for a single tag].
+    /// Width of the black border of tags in bits [default: 2 on boards, as Kalibr has it, 1 for a single tag].
     #[arg(long, value_name = "N", help_heading = heading::TAGS)]
     border_bits: Option<usize>,
 }

@@ -22,7 +22,7 @@ pub struct ByHand {
     pub ending: Option<Ending>,
     /// Captures so far that check it.
     pub checked: usize,
-    /// Views that were asked for to check it.
+    /// Views that were requested to check it.
     pub tried: usize,
     /// When it began \[s\].
     pub began_s: f64,

@@ -112,7 +112,7 @@ pub enum RefusalKind {
 }
 
 impl RefusalKind {
-    /// Whether other poses may give a capture all the same: then a sequence leaves this one out and goes on.
+    /// Whether other poses may give a capture all the same: then a sequence skips this one and continues.
     pub fn concerns_the_pose(self) -> bool {
         match self {
             Self::NoBoard | Self::NotSettled | Self::Blurred | Self::TooSimilar => true,

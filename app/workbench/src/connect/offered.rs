@@ -167,7 +167,7 @@ pub static ALL: &[Offered] = &[
     },
 ];
 
-/// Those for a part of the cell.
+/// The drivers for a part of the cell.
 pub fn of_part(part: Part) -> impl Iterator<Item = &'static Offered> {
     ALL.iter().filter(move |offered| offered.parts.contains(&part))
 }

@@ -1,4 +1,4 @@
-//! A recording that is looked at to be imported.
+//! A recording that is examined for import.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -13,9 +13,9 @@ pub struct RerunState {
     pub on: bool,
     /// The file next to the session that is written.
     pub file: Option<PathBuf>,
-    /// How it is looked at.
+    /// How it is viewed.
     pub viewer: ViewerState,
-    /// Live entries that were left out because the viewer or the disk was slow.
+    /// Live entries that were dropped because the viewer or the disk was slow.
     pub left_out: u64,
 }
 

@@ -125,7 +125,7 @@ pub struct FolderEntry {
     pub kind: FolderKind,
 }
 
-/// What an entry of a folder is to this program.
+/// Kind of an entry of a folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum FolderKind {
     Session,

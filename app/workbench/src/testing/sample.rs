@@ -374,7 +374,7 @@ fn track_point(time_s: f64) -> TrackPoint {
     }
 }
 
-/// The same, with the board tracked on its way along a circle for half a minute, and followed by the arm.
+/// The same, with the board tracked along a circle for half a minute, and followed by the arm.
 pub fn tracking() -> Model {
     let mut model = solved();
     let time_s = 30.0;

@@ -17,7 +17,7 @@ pub const MAX_TRACK_POINTS: usize = 900;
 /// The tracking result for one image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tracked {
-    /// Number of the image, see [`crate::model::FrameInfo::number`].
+    /// Number of the image, see [`crate::live::state::FrameInfo::number`].
     pub frame: u64,
     /// The board.
     pub update: Update,
@@ -113,7 +113,7 @@ pub struct TrackState {
     pub newest: Option<Arc<Tracked>>,
     /// The last images, oldest first.
     pub history: VecDeque<TrackPoint>,
-    /// How the built-in cell moves its board, as far as this program asked for it.
+    /// How the built-in cell moves its board, as far as this program requested it.
     pub board: BoardMotion,
     /// Whether this program asked the cell to hide its board.
     pub board_hidden: bool,

@@ -6,15 +6,15 @@ use super::{damped_step, is_within, pose_error};
 use crate::{Arm, JointRange};
 
 /// Largest change of one joint in one iteration: the step that simIK allows a joint by default, 10°. A prismatic joint is
-/// held to as many metres, which no step of a second's fraction needs.
+/// limited to the same number in metres, which no step in a fraction of a second reaches.
 const MAX_STEP_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
 
-/// Errors of the tip (m and rad) that no iteration is made for any more. They are some thousand times what rounding leaves
-/// of a pose, and so small that an image of the same goal is the same bit for bit from wherever the arm came. With 1e-6 a
+/// Errors of the tip (m and rad) below which no more iterations are made. They are some thousand times the rounding errors
+/// of a pose, and so small that an image of the same goal is the same bit for bit wherever the arm came from. With 1e-6 a
 /// few pixels differ by one grey value, and a calibration of ten images by 0.007 mm.
 const CONVERGED: f64 = 1e-12;
 
-/// How damped least squares iterates; the defaults are those of `sim.moveToPose`.
+/// Options of damped least squares; the defaults are those of `sim.moveToPose`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DlsOptions {
     /// Damping λ; the normal equations get λ² on their diagonal.
@@ -34,9 +34,9 @@ impl Default for DlsOptions {
 }
 
 /// Iterates from `near` with `Δq = Jᵀ (J Jᵀ + λ² I)⁻¹ e` towards a pose of the tip that need not be in reach. Joints stop
-/// at the ends of their ranges. It ends near the place that is nearest to the goal.
+/// at the ends of their ranges. It ends near the pose that is nearest to the goal.
 ///
-/// The precision of the options is not looked at: iterations go on to [`CONVERGED`].
+/// The precision of the options is not used: iterations go on to [`CONVERGED`].
 ///
 /// # Reference
 /// Wampler 1986, "Manipulator inverse kinematic solutions based on vector formulations and damped least-squares

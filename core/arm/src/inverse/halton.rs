@@ -1,10 +1,10 @@
-//! Places that fill a space evenly, the same ones every time.
+//! Points that fill a space evenly, the same ones every time.
 
 use super::super::MAX_JOINTS;
 
 /// One for each joint that an arm may have.
 const PRIMES: [u32; MAX_JOINTS] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];
-/// The first points are left out: there, coordinates of large primes rise together.
+/// The first points are left out: there, coordinates of large primes increase together.
 const SKIPPED: u32 = 40;
 
 /// Coordinate `joint` of point `n` of the sequence, in (0, 1).

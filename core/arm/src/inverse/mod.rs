@@ -22,10 +22,10 @@ pub(super) use ur::UrGeometry;
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum IkError {
-    /// No configuration reaches it, whatever the limits.
+    /// No configuration reaches it, even without limits.
     #[error("the arm cannot reach this pose: {obstacle}")]
     Unreachable {
-        /// What is in the way.
+        /// What prevents it.
         obstacle: Obstacle,
     },
     /// Configurations reach it, but all of them have a joint out of its range.
@@ -39,22 +39,22 @@ pub enum IkError {
         joint: usize,
         /// Its value there.
         needed_deg: f64,
-        /// Its lower limit.
+        /// Lower limit of the joint.
         min_deg: f64,
-        /// Its upper limit.
+        /// Upper limit of the joint.
         max_deg: f64,
     },
-    /// The search found none within the limits of the joints.
+    /// The search found no solution within the limits of the joints.
     #[error(
         "no joint values within their limits were found for this pose from {starts} places; the nearest leave the tip \
          {distance_mm:.1} mm and {angle_deg:.1}° away: move the goal towards the middle of the workspace or turn it"
     )]
     NotFound {
-        /// Distance of the nearest, millimetres.
+        /// Distance of the nearest one found, millimetres.
         distance_mm: f64,
-        /// Its angle, degrees.
+        /// Angle of the nearest one found, degrees.
         angle_deg: f64,
-        /// How many starts the search made.
+        /// Number of starts of the search.
         starts: usize,
     },
     /// Values for another number of joints.
@@ -71,20 +71,21 @@ pub enum IkError {
 }
 
 impl Arm {
-    /// Joint values within their ranges that put the tip at a pose, nearest to `near`, where the arm is: radians and
-    /// metres. A joint that can turn further than once is taken at the turn nearest to its value there.
+    /// Joint values within their ranges that put the tip at a pose, nearest to `near`, the present values of the arm:
+    /// radians and metres. A joint with a range of more than one revolution is taken at the revolution nearest to its
+    /// value there.
     ///
     /// # Method
-    /// An arm with the geometry of Universal Robots, wherever its numbers come from, has up to eight configurations in
-    /// closed form, of which this is the nearest; they agree with the pose to 1e-12 m and rad, and to 1e-8 where the arm is
-    /// exactly stretched. Any other arm is searched by damped least squares, first from `near` and then from places of its
-    /// workspace that are the same in every call, nearest first; what is found agrees to 1e-8 m and rad. A search may miss
-    /// a configuration that is there, and the nearest that it found need not be the nearest that there is. With more joints
-    /// than a pose has dimensions, those near an end of their range are moved inwards along the way, by no more than the
-    /// goal itself moves the joints.
+    /// An arm with the geometry of Universal Robots, independent of the source of its numbers, has up to eight
+    /// configurations in closed form, of which this is the nearest; they agree with the pose to 1e-12 m and rad, and to
+    /// 1e-8 where the arm is exactly stretched. Any other arm is searched by damped least squares, first from `near` and
+    /// then from places of its workspace that are the same in every call, nearest first; the result agrees to 1e-8 m and
+    /// rad. A search may miss an existing configuration, and the nearest one found need not be the nearest one that exists.
+    /// With more joints than a pose has dimensions, those near an end of their range are moved inwards in the process, by
+    /// no more than the goal itself moves the joints.
     ///
     /// # Errors
-    /// [`IkError`] says what is in the way or which joint would leave its range; after a search, how near the tip came.
+    /// [`IkError`] states what prevents it or which joint would leave its range; after a search, how near the tip came.
     pub fn inverse(&self, base_from_tip: &Pose<Base, Tip>, near: &[f64]) -> Result<Vec<f64>, IkError> {
         if near.len() != self.joint_count() {
             return Err(IkError::WrongCount { got: near.len(), need: self.joint_count() });
@@ -99,8 +100,8 @@ impl Arm {
         }
     }
 
-    /// The same without a search: in closed form, or by one descent from `near` on; `None` where that gives none. For many poses of which
-    /// some are out of reach, where [`Self::inverse`] takes a hundred times as long.
+    /// The same without a search: in closed form, or by one descent from `near`; `None` where that gives no solution. For many
+    /// poses of which some are out of reach, where [`Self::inverse`] takes a hundred times as long.
     pub fn inverse_nearby(&self, base_from_tip: &Pose<Base, Tip>, near: &[f64]) -> Option<Vec<f64>> {
         if self.ur.is_some() {
             return self.inverse(base_from_tip, near).ok();
@@ -112,13 +113,13 @@ impl Arm {
 
     /// All configurations that put the tip at a pose, every joint in (−π, π] whatever its range; `None` for an arm that
     /// has no closed form. Empty when the pose is out of reach or not finite. Where the fourth and sixth axes are parallel,
-    /// joint 6 is free, and one configuration stands for all.
+    /// joint 6 is free, and one configuration represents all.
     pub fn configurations(&self, base_from_tip: &Pose<Base, Tip>) -> Option<Vec<Vec<f64>>> {
         let found = self.ur.as_ref()?.all(self, base_from_tip.isometry());
         Some(found.iter().map(|joints| joints.to_vec()).collect())
     }
 
-    /// Joint values, found by damped least squares from `near` on, that take the tip as near to a pose as they come; the
+    /// Joint values, found by damped least squares from `near`, that take the tip as close to a pose as possible; the
     /// pose need not be in reach.
     ///
     /// # Errors
@@ -136,7 +137,7 @@ impl Arm {
     /// As [`Self::towards`]; `None` when the pose is not within the precision of the options after the last iteration.
     ///
     /// # Errors
-    /// As there.
+    /// As [`Self::towards`].
     pub fn descend(
         &self,
         base_from_tip: &Pose<Base, Tip>,
@@ -148,12 +149,12 @@ impl Arm {
         Ok(is_within(&error, options.precision_m, options.precision_rad).then_some(joints))
     }
 
-    /// Where the tip is; there must be a value for every joint.
+    /// Pose of the tip; there must be a value for every joint.
     fn tip(&self, joints: &[f64]) -> Isometry3<f64> {
         self.walk(joints, |_, _, _| ()) * self.flange_from_tip
     }
 
-    /// Where the tip is, and its velocity per velocity of each joint in the axes of the base.
+    /// Pose of the tip, and its velocity per velocity of each joint in the axes of the base.
     fn tip_and_columns(&self, joints: &[f64]) -> (Isometry3<f64>, Columns) {
         let still = Axis { kind: JointKind::Revolute, direction: Vector3::zeros(), point: Vector3::zeros() };
         let mut axes = [still; MAX_JOINTS];
@@ -182,7 +183,7 @@ fn is_within(error: &Vector6<f64>, precision_m: f64, precision_rad: f64) -> bool
     error.fixed_rows::<3>(0).norm() <= precision_m && error.fixed_rows::<3>(3).norm() <= precision_rad
 }
 
-/// `Δq = Jᵀ (J Jᵀ + λ² I)⁻¹ e`; `None` where that has no answer.
+/// `Δq = Jᵀ (J Jᵀ + λ² I)⁻¹ e`; `None` where that has no solution.
 fn damped_step(columns: &Columns, error: &Vector6<f64>, damping_squared: f64) -> Option<SMatrix<f64, MAX_JOINTS, 1>> {
     let mut damped = columns * columns.transpose();
     for i in 0..6 {
@@ -191,7 +192,7 @@ fn damped_step(columns: &Columns, error: &Vector6<f64>, damping_squared: f64) ->
     Some(columns.transpose() * damped.cholesky()?.solve(error))
 }
 
-/// The value that differs from `value` by whole turns, is in the range, and is nearest to `near`.
+/// The value that differs from `value` by whole revolutions, is in the range, and is nearest to `near`.
 fn nearest_turn(value: f64, near: f64, range: &JointRange) -> Option<f64> {
     let lowest = ((range.min - value) / TAU - JointRange::SLACK).ceil();
     let highest = ((range.max - value) / TAU + JointRange::SLACK).floor();

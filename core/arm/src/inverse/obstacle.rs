@@ -1,6 +1,6 @@
-//! What keeps an arm of Universal Robots from a pose.
+//! What prevents an arm of Universal Robots from reaching a pose.
 
-/// What is in the way of a goal.
+/// What prevents reaching a goal.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum Obstacle {
@@ -11,9 +11,9 @@ pub enum Obstacle {
         excess = (needed_m - reach_m) * 1e3
     )]
     TooFar {
-        /// Distance from shoulder to the wrist that the goal asks for.
+        /// Distance from shoulder to the wrist that the goal requires.
         needed_m: f64,
-        /// The longest there is.
+        /// The longest possible distance.
         reach_m: f64,
     },
     /// The wrist would be inside the folded arm.
@@ -23,9 +23,9 @@ pub enum Obstacle {
         excess = (least_m - needed_m) * 1e3
     )]
     TooNear {
-        /// Distance from shoulder to the wrist that the goal asks for.
+        /// Distance from shoulder to the wrist that the goal requires.
         needed_m: f64,
-        /// The shortest there is.
+        /// The shortest possible distance.
         least_m: f64,
     },
     /// The wrist would be inside the column of the robot.
@@ -37,13 +37,13 @@ pub enum Obstacle {
     InColumn {
         /// Distance of the wrist from the vertical axis.
         distance_m: f64,
-        /// The shortest there is.
+        /// The shortest possible distance.
         least_m: f64,
     },
 }
 
 impl Obstacle {
-    /// How far the goal is on the wrong side, metres.
+    /// Distance of the goal beyond the limit, metres.
     fn excess_m(&self) -> f64 {
         match *self {
             Self::TooFar { needed_m, reach_m } => needed_m - reach_m,
@@ -52,7 +52,7 @@ impl Obstacle {
         }
     }
 
-    /// The one that a smaller displacement of the goal removes.
+    /// The one of the two that a smaller displacement of the goal removes.
     pub(super) fn or_easier(self, other: Self) -> Self {
         if other.excess_m() < self.excess_m() { other } else { self }
     }

@@ -9,25 +9,25 @@ use crate::{Arm, JointKind, JointRange, MAX_JOINTS};
 
 /// Errors \[m and rad\] below which a pose counts as reached.
 const REACHED: f64 = 1e-8;
-/// Where a descent stops: what rounding leaves, with room \[m and rad\].
+/// Where a descent stops: rounding errors, with a margin \[m and rad\].
 const CONVERGED: f64 = 1e-13;
-/// Iterations of one descent. Of those that reach their goal half take 11, and one in a hundred more than 28.
+/// Iterations of one descent. Half of those that reach their goal take 11, and one in a hundred more than 28.
 const ITERATIONS: usize = 60;
-/// A descent that has improved by less than a tenth in so many iterations is in a dip that is not the goal.
+/// A descent that has improved by less than a tenth in this many iterations is in a local minimum that is not the goal.
 const PATIENCE: usize = 8;
-/// Starts beside the first, at about 10 µs each. With 96 the study `inverse_kinematics` reaches 99.93 % of the goals of a
-/// Panda, with so many 99.98 %.
+/// Starts in addition to the first, at about 10 µs each. With 96 the study `inverse_kinematics` reaches 99.93 % of the
+/// goals of a Panda, with this many 99.98 %.
 const STARTS: u32 = 256;
-/// A solution found from where the arm is with no joint farther than this \[rad\] is taken at once; one that is farther is
-/// compared with those of [`COMPARED`] more starts, for on the other side of a fold there may be a nearer one. After three
-/// times as many the nearest is nearer by hundredths of a radian.
+/// A solution found from the present values with no joint farther than this \[rad\] is taken at once; one that is farther
+/// is compared with those of [`COMPARED`] more starts, because on the other side of a fold there may be a nearer one. With
+/// three times as many starts the nearest is nearer by hundredths of a radian.
 const NEAR_RAD: f64 = PI / 3.0;
 const COMPARED: u32 = 24;
 /// Largest change of a joint in one iteration \[rad\]: the equations are linear over about as much.
 const MAX_STEP: f64 = 0.6;
-/// Damping that is always there, in units of squared singular values of an arm one unit long.
+/// Least damping, in units of squared singular values of an arm one unit long.
 const LEAST_DAMPING: f64 = 1e-9;
-/// Part of a range, from its middle, in which a joint is left where it is.
+/// Part of a range, from its middle, in which a joint is not moved.
 const COMFORT: f64 = 0.7;
 /// Dimensions of a pose: joints beyond these can move without it.
 const POSE: usize = 6;
@@ -83,15 +83,15 @@ pub(super) fn nearby(arm: &Arm, goal: &Isometry3<f64>, near: &[f64]) -> Option<V
     search.reached(&end).map(|found| search.values(&found))
 }
 
-/// Where a descent ended.
+/// End of a descent.
 struct End {
-    /// In units of the search.
+    /// Joint values in units of the search.
     joints: Values,
     /// Length of the pose error there, in units of the search.
     miss: f64,
 }
 
-/// A goal for an arm, in units in which lengths and angles count alike: lengths are divided by that of the arm.
+/// A goal for an arm, in units in which lengths and angles count equally: lengths are divided by that of the arm.
 struct Search<'a> {
     arm: &'a Arm,
     goal: &'a Isometry3<f64>,
@@ -104,7 +104,7 @@ impl<'a> Search<'a> {
     fn new(arm: &'a Arm, goal: &'a Isometry3<f64>, near: &[f64]) -> Self {
         let links: f64 = arm.joints().iter().map(|joint| joint.previous_from_joint.translation.vector.norm()).sum();
         let ends = arm.last_from_flange.translation.vector.norm() + arm.flange_from_tip.translation.vector.norm();
-        // Half of the stretched arm is what a turn moves the tip by on average; a gantry may have no links at all.
+        // A turn moves the tip by half the length of the stretched arm on average; a gantry may have no links at all.
         let stretched = links + ends;
         let unit_m = if stretched > 0.1 { stretched / 2.0 } else { 0.5 };
         let mut search = Self { arm, goal, ranges: arm.ranges(), unit_m, near: Values::zeros() };
@@ -129,13 +129,13 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Values in radians and metres. Back from its unit a value may be a rounding beyond its limit.
+    /// Values in radians and metres. Converted back, a value may exceed its limit by rounding.
     fn values(&self, joints: &Values) -> Vec<f64> {
         let value = |i: usize| self.arm.joints()[i].range.clamp(joints[i] * self.unit(i));
         (0..self.count()).map(value).collect()
     }
 
-    /// Error of the pose, and how it falls with each joint.
+    /// Error of the pose, and its decrease with each joint.
     fn at(&self, joints: &Values) -> (Vector6<f64>, Columns) {
         let mut raw = [0.0; MAX_JOINTS];
         for (i, value) in raw.iter_mut().enumerate().take(self.count()) {
@@ -154,7 +154,7 @@ impl<'a> Search<'a> {
 
     /// Levenberg–Marquardt within the ranges.
     ///
-    /// The damping follows the error, which carries the descent past singularities and leaves it quadratic at its end:
+    /// The damping follows the error, which takes the descent past singularities and keeps it quadratic at its end:
     /// Sugihara 2011, "Solvability-unconcerned inverse kinematics by the Levenberg–Marquardt method".
     fn descend(&self, start: &Values) -> End {
         let mut joints = *start;
@@ -189,8 +189,8 @@ impl<'a> Search<'a> {
         End { joints, miss }
     }
 
-    /// One step: joints that stand at an end of their range and would leave it are held, and where there are joints to
-    /// spare those near an end are moved inwards.
+    /// One step: joints that are at an end of their range and would leave it are held, and where there are redundant
+    /// joints those near an end are moved inwards.
     fn step(&self, joints: &Values, columns: &Columns, error: &Vector6<f64>, damping: f64) -> Option<Values> {
         let mut free = *columns;
         let mut step = damped_step(&free, error, damping)?;
@@ -219,7 +219,7 @@ impl<'a> Search<'a> {
         Some(if largest > MAX_STEP { step * (MAX_STEP / largest) } else { step })
     }
 
-    /// A motion that leaves the pose and takes joints away from the ends of their ranges, no longer than `most`.
+    /// A motion that keeps the pose and takes joints away from the ends of their ranges, no longer than `most`.
     ///
     /// Liégeois 1977, "Automatic supervisory control of the configuration and behavior of multibody mechanisms".
     fn inwards(
@@ -246,7 +246,7 @@ impl<'a> Search<'a> {
         Some(if length > most { motion * (most / length) } else { motion })
     }
 
-    /// The end of a descent at the turns nearest to where the arm is, when it is at the goal.
+    /// The end of a descent at the revolutions nearest to the present values, when it is at the goal.
     fn reached(&self, end: &End) -> Option<Values> {
         // The unit may be longer than a metre.
         if end.miss > REACHED / self.unit_m.max(1.0) {
@@ -261,12 +261,12 @@ impl<'a> Search<'a> {
         Some(joints)
     }
 
-    /// Place `n` of those that fill the workspace; a joint without end is taken around where it is.
+    /// Place `n` of those that fill the workspace; a joint without limits is taken around its present value.
     fn place(&self, n: u32) -> Values {
         let mut joints = Values::zeros();
         for i in 0..self.count() {
             let range = &self.ranges[i];
-            // One turn is all there is, and a length that has no end is searched over four times the arm.
+            // One revolution covers all angles, and an unlimited length is searched over four times the arm.
             let middle = if range.min.is_finite() && range.max.is_finite() {
                 f64::midpoint(range.min, range.max)
             } else {

@@ -110,7 +110,7 @@ fn a_goal_with_joints_at_their_stops_is_reached() {
 #[test]
 fn the_seventh_joint_keeps_an_arm_away_from_its_limits_along_a_path() {
     let arm = arm(PANDA);
-    // Joint 3 is at 96 % of its range, and joint 1 beside it could do the same.
+    // Joint 3 is at 96 % of its range, and joint 1 next to it could do the same.
     let start = vec![-0.9, 0.25, 2.78, -1.6, 0.4, 1.9, 0.5];
     let from = arm.forward(&start).expect("seven");
     let used = |joints: &[f64]| {
@@ -122,7 +122,7 @@ fn the_seventh_joint_keeps_an_arm_away_from_its_limits_along_a_path() {
     };
     assert!(used(&start) > 0.95);
     let (mut joints, mut largest_step, mut second_round) = (start.clone(), 0.0_f64, 0.0_f64);
-    // Twice round a circle of 80 mm and back to where it began, as a person jogs.
+    // Twice around a circle of 80 mm and back to the start, like jogging by hand.
     for n in 1..=200 {
         let angle = std::f64::consts::TAU * f64::from(n) / 100.0;
         let shift = nalgebra::Vector3::new(angle.cos() - 1.0, angle.sin(), 0.0) * 0.08;
@@ -133,11 +133,11 @@ fn the_seventh_joint_keeps_an_arm_away_from_its_limits_along_a_path() {
         joints = next;
         second_round = if n > 100 { second_round.max(used(&joints)) } else { 0.0 };
     }
-    // Without a thought of limits 95 % are used in the second round, and more in the first.
+    // Without regard to limits 95 % are used in the second round, and more in the first.
     assert!(second_round < 0.85, "{second_round} of a range is used");
     // Five millimetres of the tip are some hundredths of a radian; no step is a jump to another posture.
     assert!(largest_step < 0.1, "{largest_step}");
-    // With nothing to do it stays.
+    // With nothing to do it stays at its place.
     let rest = arm.inverse(&from, &joints).expect("it is there");
     assert!(rest.iter().zip(&joints).all(|(a, b)| (a - b).abs() < 1e-6), "{rest:?} is not {joints:?}");
 }
@@ -168,7 +168,8 @@ proptest! {
         nudge in proptest::collection::vec(-0.01..0.01_f64, 7),
     ) {
         let joints = arms::values_at(&arm, parts);
-        // The weakest motion of the tip per motion of the joints; near a singularity a small way is a large turn.
+        // The weakest motion of the tip per motion of the joints; near a singularity a small motion of the tip is a
+        // large turn.
         let singular = arm.jacobian(&joints).expect("joints").svd(false, false).singular_values;
         let weakest = singular[joints.len().min(6) - 1];
         prop_assume!(weakest > 0.05);
@@ -176,8 +177,8 @@ proptest! {
         let near: Vec<f64> = joints.iter().zip(&nudge).map(|(q, d)| q + d).collect();
         let found = arm.inverse(&goal, &near)?;
         prop_assert!(miss(&arm, &found, &goal) < 3e-8);
-        // The nudge moves the tip by less than 0.05 m and rad, the way back is that over the weakest motion, and the joint
-        // to spare goes no farther.
+        // The nudge moves the tip by less than 0.05 m and rad, the motion back is that over the weakest motion, and the
+        // redundant joint goes no farther.
         let moved = found.iter().zip(&near).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
         prop_assert!(moved < 2.0 * 0.05 / weakest, "{near:?} went to {found:?}");
     }

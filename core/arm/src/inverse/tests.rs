@@ -4,7 +4,7 @@ use proptest::test_runner::RngSeed;
 use super::*;
 use crate::ArmKind;
 
-/// What an arm has in reach of a person: it stands somewhere and carries something.
+/// An arm as in practice: mounted somewhere, with a tool.
 fn mounted(arm: Arm) -> Arm {
     let foot = se3::exp(&Vector6::new(0.4, -0.2, 0.7, 0.3, -0.2, 1.1));
     let tool = se3::exp(&Vector6::new(0.01, 0.03, 0.12, -0.4, 0.2, 0.5));
@@ -95,7 +95,7 @@ proptest! {
     fn the_closed_form_finds_all_that_the_search_finds_and_never_a_farther_one(
         arm in any_ur(), joints in six(PI), near in six(PI),
     ) {
-        // Beside a singularity a configuration is a valley, and the search stops anywhere in it.
+        // Close to a singularity a configuration is a valley, and the search stops anywhere in it.
         let jacobian = arm.jacobian(&joints).expect("six").fixed_columns::<6>(0).into_owned();
         prop_assume!(jacobian.determinant().abs() > 1e-4);
         let goal = arm.forward(&joints).expect("six");

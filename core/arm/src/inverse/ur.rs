@@ -1,8 +1,8 @@
 //! The closed form of the arms of Universal Robots.
 //!
 //! Two axes that cross at right angles in the shoulder, three that are parallel, and a wrist of which each axis crosses the
-//! next at a right angle. Four lengths say all that matters; where an arm stands, how its joints count and what is behind
-//! its last axis are constants around them.
+//! next at a right angle. Four lengths determine all that matters; where an arm is mounted, how its joints count and what
+//! is behind its last axis are constants around them.
 //!
 //! Reference: Hawkins 2013, "Analytic inverse kinematics for the Universal Robots UR-5/UR-10 arms"; the wrist angles
 //! are taken from the directions of the axes rather than from positions, which keeps them exact near the singularity.
@@ -19,7 +19,7 @@ const JOINTS: usize = 6;
 /// A value for each of them.
 type Six = [f64; JOINTS];
 
-/// How far the chain of an arm may be from that of its closed form \[m, rad\] for the closed form to be its own. Files
+/// Largest deviation of the chain of an arm from that of its closed form \[m, rad\] for the closed form to apply. Files
 /// write a quarter turn with five digits or more, several times over; the solutions are polished on the chain itself.
 const SAME_CHAIN: f64 = 1e-4;
 /// Joint values at which the two are compared: none is special for any of the axes.
@@ -28,7 +28,7 @@ const COMPARED_AT: [Six; 3] = [[0.0; 6], [0.7, -1.3, 1.9, 0.4, -0.8, 2.3], [-2.1
 const DEGENERATE: f64 = 1e-3;
 /// Sine of the fifth angle below which the fourth and sixth axes count as parallel: the sixth joint is then free.
 const PARALLEL_WRIST: f64 = 1e-10;
-/// How far past its reach \[relative\] a goal may be by rounding alone: the arm is then taken as exactly stretched.
+/// How far beyond its reach \[relative\] a goal may be by rounding alone: the arm is then taken as exactly stretched.
 const REACH_SLACK: f64 = 1e-9;
 /// A closed-form solution whose pose misses the goal by more \[m, rad\] is not one.
 const ACCEPT: f64 = 1e-8;
@@ -37,14 +37,14 @@ const POLISHED: f64 = 1e-12;
 /// Two branches closer than this in every joint \[rad\] are one: at a stretched elbow the two halves meet.
 const SAME_BRANCH_RAD: f64 = 1e-6;
 
-/// The arm as a chain of rows of Denavit and Hartenberg with the shoulder and the end of the wrist at its two ends:
-/// `first_from_shoulder · Rz(c₁) Rx(90°) · Rz(c₂) Tx(upper) · Rz(c₃) Tx(lower) · Rz(c₄) Tz(side) Rx(90°) ·
-/// Rz(c₅) Tz(wrist) Rx(−90°) · Rz(c₆) · wrist_from_flange`, with `c = sense · q + zero`.
+/// The arm as a chain of Denavit–Hartenberg rows with the shoulder and the end of the wrist at its two ends:
+/// `first_from_shoulder · Rz(c₁) Rx(90°) · Rz(c₂) Tx(upper) · Rz(c₃) Tx(lower) · Rz(c₄) Tz(side) Rx(90°) · Rz(c₅)
+/// Tz(wrist) Rx(−90°) · Rz(c₆) · wrist_from_flange`, with `c = sense · q + zero`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct UrGeometry {
     upper_m: f64,
     lower_m: f64,
-    /// How far the wrist is beside the plane of the two long links; not negative.
+    /// Offset of the wrist from the plane of the two long links; not negative.
     side_m: f64,
     wrist_m: f64,
     first_from_shoulder: Isometry3<f64>,
@@ -55,7 +55,7 @@ pub(crate) struct UrGeometry {
 }
 
 impl UrGeometry {
-    /// The closed form of an arm; `None` when it is none of Universal Robots, whatever it is called.
+    /// The closed form of an arm; `None` when its geometry is not that of Universal Robots, whatever its name.
     pub fn of(arm: &Arm) -> Option<Self> {
         let bare = arm.clone().mounted(Isometry3::identity(), Isometry3::identity());
         if bare.joint_count() != JOINTS || bare.joints().iter().any(|joint| joint.kind != JointKind::Revolute) {
@@ -74,15 +74,15 @@ impl UrGeometry {
         is_the_same.then_some(found)
     }
 
-    /// The rows by the axes at zero, where those of joints 2, 3 and 4 count as `sense` times what they are. Nothing is
-    /// checked but that the rows exist.
+    /// The rows by the axes at zero, where those of joints 2, 3 and 4 count as `sense` times what they are. Only the
+    /// existence of the rows is checked.
     fn from_axes(axes: &[Axis; JOINTS], sense: f64, first_from_flange: &Isometry3<f64>) -> Option<Self> {
         let direction = |i: usize| if (1..=3).contains(&i) { axes[i].direction * sense } else { axes[i].direction };
         let (z0, z1, z4, z5) = (direction(0), direction(1), direction(4), direction(5));
         let shoulder = crossing(&axes[0], &axes[1])?;
         let elbow_end = crossing(&axes[3], &axes[4])?;
         let wrist_end = crossing(&axes[4], &axes[5])?;
-        // The long links lie in the plane through the shoulder across the parallel axes.
+        // The long links are in the plane through the shoulder across the parallel axes.
         let in_plane = |point: &Vector3<f64>| point - z1 * (point - shoulder).dot(&z1);
         let (elbow, wrist) = (in_plane(&axes[2].point), in_plane(&axes[3].point));
         let (upper, lower) = (elbow - shoulder, wrist - elbow);
@@ -133,7 +133,7 @@ impl UrGeometry {
             * self.wrist_from_flange
     }
 
-    /// What follows the fifth joint.
+    /// The transform after the fifth joint.
     fn pitch_link(&self) -> Isometry3<f64> {
         Isometry3::translation(0.0, 0.0, self.wrist_m) * turn_x(-FRAC_PI_2)
     }
@@ -200,7 +200,7 @@ impl UrGeometry {
         }
         match (found.is_empty(), nearest_miss) {
             (true, Some(obstacle)) => Err(IkError::Unreachable { obstacle }),
-            // Every branch solved but none passed the check: the goal sits on the very edge of the workspace.
+            // Every branch solved but none passed the check: the goal is on the very edge of the workspace.
             (true, None) => {
                 let reach_m = self.upper_m + self.lower_m;
                 Err(IkError::Unreachable { obstacle: Obstacle::TooFar { needed_m: reach_m, reach_m } })
@@ -209,7 +209,7 @@ impl UrGeometry {
         }
     }
 
-    /// First angle: the end of the fourth link must be beside the plane of the arm.
+    /// First angle: the end of the fourth link must be at its offset from the plane of the arm.
     fn pan_angles(&self, shoulder_from_wrist: &Isometry3<f64>) -> Result<[f64; 2], Obstacle> {
         let wrist = shoulder_from_wrist.translation.vector;
         let distance_m = wrist.x.hypot(wrist.y);
@@ -223,7 +223,7 @@ impl UrGeometry {
         Ok([towards + side, towards - side])
     }
 
-    /// Second, third and fourth angle: the planar arm of two links, and what is left of the rotation.
+    /// Second, third and fourth angle: the planar arm of two links, and the remaining rotation.
     fn elbow_angles(
         &self,
         shoulder_from_wrist: &Isometry3<f64>,

@@ -5,22 +5,22 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, UnitVector3,
 use super::{RawJoint, RawLimit, Urdf, UrdfError, UrdfProblem};
 use crate::{Arm, ArmError, Joint, JointKind, JointRange, LONGEST_LINK_M, MAX_JOINTS};
 
-/// Longest way of a prismatic joint in metres, from its zero: tracks of twenty metres are made, and half a metre in
-/// millimetres is above it.
+/// Longest travel of a prismatic joint in metres, from its zero: tracks of twenty metres exist, and half a metre given
+/// in millimetres is above it.
 const LONGEST_WAY_M: f64 = 50.0;
-/// Length of a vector below which it has no direction.
+/// Length of a vector below which its direction is undefined.
 const NO_DIRECTION: f64 = 1e-6;
 
 impl Urdf {
-    /// The chain between two links, named or, where the file leaves no choice, found: the base is the only link without a
-    /// parent, the tip the only one behind it without a child.
+    /// The chain between two links, given by name or, where the file is unambiguous, found: the base is the only link
+    /// without a parent, the tip the only one behind it without a child.
     ///
-    /// The frame of the base link is the base, and that of the tip link the tip. Joints have their names, ranges and
-    /// speeds of the file.
+    /// The frame of the base link is the base, and that of the tip link the tip. Joints have the names, ranges and
+    /// speeds in the file.
     ///
     /// # Errors
-    /// [`UrdfError`]: links that are not there or not to be told, joints on the way that no chain has, numbers that no arm
-    /// has.
+    /// [`UrdfError`]: links that are missing or ambiguous, joints on the path that a chain cannot have, numbers that are
+    /// not valid for an arm.
     pub fn arm(&self, base: Option<&str>, tip: Option<&str>) -> Result<Arm, UrdfError> {
         let base = match base {
             Some(name) => self.link(name)?,
@@ -76,7 +76,7 @@ impl Urdf {
     }
 
     fn only_leaf<'a>(&'a self, base: &'a str) -> Result<&'a str, UrdfError> {
-        // Every link of the list is passed once; reading has made sure that there is no ring.
+        // Every link of the list is passed once; reading has checked that there is no loop.
         let (mut below, mut next) = (vec![base], 0);
         let mut leaves = Vec::new();
         while let Some(&link) = below.get(next) {
@@ -109,14 +109,14 @@ impl Urdf {
         Ok(way)
     }
 
-    /// Range and speed of a joint that ends somewhere.
+    /// Range and speed of a joint with limits.
     fn range(&self, raw: &RawJoint) -> Result<JointRange, UrdfProblem> {
         let missing = || UrdfProblem::NoLimit { joint: raw.name.clone(), kind: raw.kind.clone() };
         let limit = raw.limit.as_ref().ok_or_else(missing)?;
         let end = |attribute, text: Option<&String>, endless: f64| match text {
             Some(text) => numbers(raw, attribute, text, "a number").map(|[value]| value),
             None if self.version >= (1, 2) => Ok(endless),
-            // The default of older versions is 0. One end of 0 may be meant; both cannot.
+            // The default of older versions is 0. One limit of 0 may be intended; both cannot.
             None if limit.lower.is_some() || limit.upper.is_some() => Ok(0.0),
             None => Err(missing()),
         };
@@ -134,7 +134,7 @@ impl Urdf {
     }
 }
 
-/// Range and speed of a joint that turns on and on.
+/// Range and speed of a continuous joint.
 fn endless(raw: &RawJoint) -> Result<JointRange, UrdfProblem> {
     Ok(JointRange { speed: speed(raw, raw.limit.as_ref())?, ..JointRange::ENDLESS })
 }
@@ -177,7 +177,7 @@ fn origin(raw: &RawJoint, version: (u32, u32)) -> Result<Isometry3<f64>, UrdfPro
     Ok(Isometry3::from_parts(Translation3::from(shift), rotation))
 }
 
-/// The direction of a joint; x where the file says none, as URDF has it.
+/// The direction of a joint; x where the file states none, as in URDF.
 fn axis(raw: &RawJoint) -> Result<UnitVector3<f64>, UrdfProblem> {
     let Some(text) = &raw.axis else { return Ok(Vector3::x_axis()) };
     let [x, y, z] = numbers(raw, "xyz of <axis>", text, "three numbers")?;
@@ -185,7 +185,7 @@ fn axis(raw: &RawJoint) -> Result<UnitVector3<f64>, UrdfProblem> {
     UnitVector3::try_new(Vector3::new(x, y, z), NO_DIRECTION).ok_or_else(zero)
 }
 
-/// So many finite numbers.
+/// `N` finite numbers.
 fn numbers<const N: usize>(
     raw: &RawJoint,
     attribute: &'static str,

@@ -9,15 +9,15 @@ use handeye_wording::text;
 #[error("{place}: {problem}", place = place(file, *line))]
 #[non_exhaustive]
 pub struct UrdfError {
-    /// The file as it was named.
+    /// The name of the file as given.
     pub file: String,
-    /// Line of the element, counted from 1; `None` when the file as a whole is meant.
+    /// Line of the element, counted from 1; `None` for the file as a whole.
     pub line: Option<u32>,
     /// What is wrong there.
     pub problem: Box<UrdfProblem>,
 }
 
-/// The place of an error on one line, whatever the file is called.
+/// The place of an error on one line, for any name of the file.
 fn place(file: &str, line: Option<u32>) -> Text {
     let file = if file.contains(char::is_control) { format!("{file:?}") } else { file.to_owned() };
     match line {
@@ -26,26 +26,26 @@ fn place(file: &str, line: Option<u32>) -> Text {
     }
 }
 
-/// A defect of a URDF file, or of what was asked of it.
+/// A defect of a URDF file, or of a request to it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum UrdfProblem {
-    /// The file system says no, or it is not text.
+    /// The file system cannot read it, or it is not text.
     #[error("cannot be read: {0}")]
     Unreadable(String),
     /// Not well-formed.
     #[error("is not XML: {0}")]
     NotXml(String),
-    /// The source of a URDF.
+    /// A xacro file, the source of a URDF.
     #[error("is xacro source, from which a URDF is made first: run `xacro FILE > robot.urdf` and name robot.urdf")]
     Xacro,
-    /// Another format.
+    /// XML of another format.
     #[error("is not a URDF: its root element is <{root}> instead of <robot>")]
     NotUrdf {
         /// The element.
         root: String,
     },
-    /// Something that every element of the kind has.
+    /// A missing attribute or child that every element of this kind has.
     #[error("{element} has no {what}")]
     Missing {
         /// The element, with its name where it has one.
@@ -53,7 +53,7 @@ pub enum UrdfProblem {
         /// What it lacks.
         what: &'static str,
     },
-    /// Two of a name.
+    /// Two elements with the same name.
     #[error("{element} is there twice: names of links and of joints are unique")]
     Twice {
         /// The element with its name.
@@ -84,13 +84,13 @@ pub enum UrdfProblem {
         /// The other.
         second: String,
     },
-    /// Links in a ring.
+    /// Links in a loop.
     #[error("joints lead in a loop through link \"{link}\" and back to it: leave out the joint that closes it")]
     Loop {
-        /// A link of the ring.
+        /// A link of the loop.
         link: String,
     },
-    /// More than one link that the arm could stand on.
+    /// More than one link that could be the base.
     #[error("has {count} links without a parent, {links}: name the one that the arm stands on as the base link", count = links.len(), links = quoted(links))]
     SeveralRoots {
         /// All of them.
@@ -102,12 +102,12 @@ pub enum UrdfProblem {
         /// All of them.
         links: Vec<String>,
     },
-    /// A name that is none of a link.
+    /// A name that is not that of a link.
     #[error("has no link \"{name}\"; it has {links}", links = quoted(links))]
     NoSuchLink {
-        /// What was asked for.
+        /// The requested name.
         name: String,
-        /// The links there are.
+        /// The links of the file.
         links: Vec<String>,
     },
     /// The tip is not carried by the base.
@@ -126,7 +126,7 @@ pub enum UrdfProblem {
     Unsupported {
         /// Name of the joint in the file.
         joint: String,
-        /// Its type as the file has it.
+        /// Its type in the file.
         kind: String,
     },
     /// A joint that follows another.
@@ -140,19 +140,19 @@ pub enum UrdfProblem {
         /// The one it follows.
         of: String,
     },
-    /// Text where numbers belong, too many of them, or one that is not finite.
+    /// Text where numbers are expected, too many of them, or one that is not finite.
     #[error("{attribute} of joint \"{joint}\" is \"{text}\": it takes {needs}")]
     BadNumber {
         /// Name of the joint in the file.
         joint: String,
         /// Element and attribute.
         attribute: &'static str,
-        /// What it says.
+        /// Its text.
         text: String,
-        /// What it should.
+        /// The expected content.
         needs: &'static str,
     },
-    /// No direction.
+    /// An axis without a direction.
     #[error("the axis of joint \"{joint}\" is 0 0 0: give its direction, for example 0 0 1")]
     ZeroAxis {
         /// Name of the joint in the file.
@@ -168,7 +168,7 @@ pub enum UrdfProblem {
         /// Its type.
         kind: String,
     },
-    /// No room between the limits.
+    /// Limits without room between them.
     #[error("joint \"{joint}\" goes from {lower} to {upper}: lower has to be below upper")]
     InvertedLimit {
         /// Name of the joint in the file.
@@ -178,24 +178,24 @@ pub enum UrdfProblem {
         /// Upper limit.
         upper: f64,
     },
-    /// A speed that lets it stand still for ever.
+    /// A speed with which the joint can never move.
     #[error("the velocity of joint \"{joint}\" is {speed}: it has to be above zero, or left out when it is not known")]
     BadSpeed {
         /// Name of the joint in the file.
         joint: String,
-        /// What it says.
+        /// The stated speed.
         speed: f64,
     },
-    /// A length that no arm has.
+    /// A length beyond that of any arm.
     #[error(
         "{what} of joint \"{joint}\" is {length_m} m, longer than any arm: lengths of a URDF are in metres, are these millimetres?"
     )]
     TooLong {
         /// Name of the joint in the file.
         joint: String,
-        /// What is so long.
+        /// What has this length.
         what: &'static str,
-        /// How long.
+        /// Its length.
         length_m: f64,
     },
     /// No arm at all, or more joints than one has.
@@ -203,26 +203,26 @@ pub enum UrdfProblem {
         "has {got} joints that move between \"{base}\" and \"{tip}\": a chain has 1 to {MAX_JOINTS}; name other links"
     )]
     JointCount {
-        /// How many.
+        /// Number of joints.
         got: usize,
         /// The base link.
         base: String,
         /// The tip link.
         tip: String,
     },
-    /// What the chain itself says.
+    /// An error of the chain itself.
     #[error("between \"{base}\" and \"{tip}\": {error}")]
     Arm {
         /// The base link.
         base: String,
         /// The tip link.
         tip: String,
-        /// Why.
+        /// The error.
         error: ArmError,
     },
 }
 
-/// Names in quotes, with commas between; of very many the first.
+/// Names in quotes, with commas between; only the first if there are very many.
 fn quoted(names: &[String]) -> Text {
     const SHOWN: usize = 12;
     let shown: Vec<String> = names.iter().take(SHOWN).map(|name| format!("\"{name}\"")).collect();

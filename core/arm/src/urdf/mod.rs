@@ -1,4 +1,4 @@
-//! Arms out of URDF files, the description of robots that ROS and many others use.
+//! Arms from URDF files, the description of robots that ROS and many others use.
 //!
 //! ```
 //! use handeye_arm::urdf::Urdf;
@@ -16,12 +16,12 @@
 //! ```
 //!
 //! # What is read
-//! Links by name; of joints `type`, `parent`, `child`, `origin` (`xyz` and `rpy`, or `quat_xyzw` from version 1.1 on),
+//! Links by name; for joints `type`, `parent`, `child`, `origin` (`xyz` and `rpy`, or `quat_xyzw` from version 1.1 on),
 //! `axis`, `limit` (`lower`, `upper`, `velocity`) and `mimic`. The frame of a link is that of the joint which carries it.
-//! Soft limits (`safety_controller`), inertia, meshes and all else are passed over.
+//! Soft limits (`safety_controller`), inertia, meshes and all else are ignored.
 //!
-//! The structure of the whole file is checked, numbers only where they belong to the chain that is asked for: a gripper
-//! with an odd joint is in nobody's way.
+//! The structure of the whole file is checked, numbers only where they belong to the requested chain: a gripper with an
+//! unusual joint does no harm.
 //!
 //! # Reference
 //! <https://wiki.ros.org/urdf/XML> and the schema of urdfdom.
@@ -34,17 +34,17 @@ use std::path::Path;
 
 pub use error::{UrdfError, UrdfProblem};
 
-/// A URDF file as it was read: names, and the texts of its numbers.
+/// A URDF file as read: names, and the texts of its numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Urdf {
     file: String,
-    /// From version 1.1 on a rotation may be a quaternion, from 1.2 on a joint without limits may say none.
+    /// From version 1.1 on a rotation may be a quaternion, from 1.2 on a joint without limits may state none.
     version: (u32, u32),
     links: Vec<String>,
     joints: Vec<RawJoint>,
 }
 
-/// A joint of the file. Numbers are still text: those off the chain are never looked at.
+/// A joint of the file. Numbers are still text: those off the chain are never parsed.
 #[derive(Debug, Clone, PartialEq)]
 struct RawJoint {
     name: String,
@@ -89,10 +89,10 @@ impl Urdf {
         }
     }
 
-    /// Reads the text of a file; `file` is what errors call it.
+    /// Reads the text of a file; `file` is its name in errors.
     ///
     /// # Errors
-    /// Whatever is wrong with the structure: not XML, xacro source, a name twice, a link that is missing, a loop.
+    /// Any fault of the structure: not XML, xacro source, a name twice, a link that is missing, a loop.
     pub fn parse(text: &str, file: &str) -> Result<Self, UrdfError> {
         read::read(text, file)
     }

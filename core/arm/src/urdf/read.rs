@@ -13,12 +13,13 @@ pub(super) fn read(text: &str, file: &str) -> Result<Urdf, UrdfError> {
         if text.contains("<xacro:") {
             return fail(None, UrdfProblem::Xacro);
         }
-        // What is missing at the end is reported at the very beginning.
+        // A missing end is reported at the very beginning.
         let (row, column) = (error.pos().row, error.pos().col);
         fail((row, column).ne(&(1, 1)).then_some(row), UrdfProblem::NotXml(error.to_string()))
     })?;
     let line = |node: &Node<'_, '_>| Some(document.text_pos_at(node.range().start).row);
-    // xacro leaves its name space on the root of what it makes, so an element or an unexpanded text is what tells.
+    // xacro leaves its namespace on the root of its output, so only an element or an unexpanded text identifies a
+    // source.
     let xacro = document.descendants().find(|node| {
         node.tag_name().namespace().is_some_and(|space| space.contains("xacro"))
             || node.attributes().any(|a| a.value().contains("${") || a.value().contains("$(arg "))
@@ -63,7 +64,7 @@ pub(super) fn read(text: &str, file: &str) -> Result<Urdf, UrdfError> {
     Ok(urdf)
 }
 
-/// The `version` of the robot; 1.0 where it says none or something else, as other readers have it.
+/// The `version` of the robot; 1.0 where it states none or something else, as in other readers.
 fn version(root: &Node<'_, '_>) -> (u32, u32) {
     let text = root.attribute("version").unwrap_or_default().trim();
     let parts = text.split_once('.').and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
@@ -99,7 +100,7 @@ fn joint(node: &Node<'_, '_>, name: &str, line: u32) -> Result<RawJoint, &'stati
     })
 }
 
-/// Every joint between links that are there, no link behind two joints, and no ring.
+/// Checks that every joint is between existing links, that no link is behind two joints, and that there is no loop.
 fn check_tree(urdf: &Urdf) -> Result<(), UrdfError> {
     let links: BTreeSet<&str> = urdf.links.iter().map(String::as_str).collect();
     let mut carried_by: BTreeMap<&str, &RawJoint> = BTreeMap::new();
@@ -115,7 +116,7 @@ fn check_tree(urdf: &Urdf) -> Result<(), UrdfError> {
             return Err(urdf.error(Some(joint), UrdfProblem::TwoParents { link, first, second }));
         }
     }
-    // Links whose way up is known to end. Each link is passed once however long the chain.
+    // Links whose path upwards is known to end. Each link is passed once however long the chain.
     let mut rooted: BTreeSet<&str> = BTreeSet::new();
     for start in links {
         let (mut way, mut link) = (BTreeSet::new(), start);

@@ -49,7 +49,7 @@ fn what_a_file_leaves_out_is_what_urdf_says_it_is() {
     assert_eq!(arm.joints()[0].range, crate::JointRange::ENDLESS);
     let half = arm_of(&one_joint("prismatic", "<limit upper=\"0.5\"/>")).expect("lower is 0");
     assert_eq!((half.joints()[0].range.min, half.joints()[0].range.max), (0.0, 0.5));
-    // Version 1.1 brought quaternions, 1.2 joints that say that they have no limits.
+    // Version 1.1 brought quaternions, 1.2 joints that state that they have no limits.
     let turned =
         one_joint("revolute", "<origin quat_xyzw=\"0 0 2 2\"/><limit/>").replace("name=\"r\"", "version=\"1.2\"");
     let turned = arm_of(&turned).expect("a good file");
@@ -76,7 +76,7 @@ fn fixed_joints_in_front_between_and_behind_belong_to_the_chain() {
 #[test]
 fn the_ur5_of_ros_is_the_one_that_is_built_in() {
     let (ours, theirs) = (ArmKind::Ur5.arm(), Urdf::parse(arms::UR5.urdf, "ur5").expect("a good file"));
-    // The maker's base is the link `base`, which ROS has half a turn from `base_link`.
+    // The manufacturer's base is the link `base`, which in ROS is half a turn from `base_link`.
     let ros = theirs.arm(Some("base_link"), Some("tool0")).expect("a chain");
     for n in 0..20 {
         let q: Vec<f64> = (0..6).map(|i| (f64::from(n * 7 + i * 3) * 0.7).sin() * 3.0).collect();
@@ -160,7 +160,7 @@ fn a_structure_that_is_no_tree_is_refused() {
     assert!(matches!(problem(&ring), UrdfProblem::Loop { .. }), "{}", problem(&ring));
     let own = robot(&joint("aa", "a", "a"));
     assert!(matches!(problem(&own), UrdfProblem::Loop { .. }), "{}", problem(&own));
-    // A ring beside the root that has a way into nothing.
+    // A loop separate from the root.
     let beside = robot(&format!("{bc}{}", joint("cb", "c", "b")));
     assert!(matches!(problem(&beside), UrdfProblem::Loop { .. }), "{}", problem(&beside));
     let closed = problem(&robot(&format!("{ab}{bc}{}", joint("ac", "a", "c"))));
@@ -184,7 +184,7 @@ fn files_that_are_no_urdf_say_what_they_are() {
         assert_eq!(problem(source), UrdfProblem::Xacro, "{source}");
     }
     assert!(problem(xacro).to_string().contains("run `xacro "));
-    // What xacro makes keeps its name space.
+    // The output of xacro keeps its namespace.
     let made = one_joint("continuous", "").replace("name=\"r\"", "xmlns:xacro=\"http://www.ros.org/wiki/xacro\"");
     assert!(arm_of(&made).is_ok());
     assert_eq!(problem("<sdf version=\"1.7\"/>"), UrdfProblem::NotUrdf { root: "sdf".to_owned() });
@@ -203,7 +203,7 @@ fn files_that_are_no_urdf_say_what_they_are() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, rng_seed: RngSeed::Fixed(4), ..ProptestConfig::default() })]
 
-    /// Whatever a disk or an editor does to a file, the answer is an arm whose numbers are finite, or an error.
+    /// However a file is corrupted, the result is an arm whose numbers are finite, or an error.
     #[test]
     fn a_file_with_a_part_replaced_never_panics(
         file in proptest::sample::select(arms::ALL.to_vec()),

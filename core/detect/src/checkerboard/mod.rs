@@ -15,7 +15,7 @@ use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::Grid;
 use handeye_geometry::targets::observation::{Corner, Corners};
 
-/// Least share of neighbouring squares that must differ in the direction the pattern asks for.
+/// Least share of neighbouring squares that must differ in the direction of the pattern.
 const MIN_ALTERNATION: f64 = 0.9;
 
 /// Standard deviation per axis \[px\] stated for a corner that the model of a corner does not fit and `cornerSubPix`
@@ -38,7 +38,7 @@ pub(super) fn find(image: &GrayImage, grid: &Grid, cancel: &CancelToken) -> Resu
 }
 
 /// The sides of the largest chessboard in sight, or of the part of it that is seen, in inner corners, the longer first;
-/// `None` below three by three. `grid` is what was looked for.
+/// `None` below three by three. `grid` is the searched one.
 ///
 /// # Errors
 /// [`VisionError::Cancelled`].

@@ -18,7 +18,7 @@ const SIGMA_PER_SPACING: f64 = 0.16;
 const SIGMA_PX: (f64, f64) = (1.1, 3.0);
 /// The window reaches this many standard deviations.
 const REACH: f64 = 2.5;
-/// Fits per corner at the most.
+/// Most fits per corner.
 const FITS: usize = 12;
 /// A fit that moves less than this has converged.
 const CONVERGED_PX: f64 = 1e-5;

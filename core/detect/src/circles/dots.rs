@@ -29,7 +29,7 @@ pub(crate) struct Dot {
     pub centre: Vector2<f64>,
     /// Area as a part of its cell.
     pub area: f64,
-    /// Whether the image border leaves its window whole; a cut window still tells a larger dot, but has no centre.
+    /// Whether the image border leaves its window whole; a cut window still shows a larger dot, but has no centre.
     pub whole: bool,
 }
 
@@ -109,10 +109,10 @@ pub(crate) fn quantile(values: &mut [f64], part: f64) -> Option<f64> {
 /// Turns centres of images of dots into images of centres.
 ///
 /// The image of a round dot is an ellipse, and its centre lies nearer to the camera's side than the image of the dot's
-/// centre: for a dot of diameter d at distance z seen under an angle t by about f d² sin t cos t / (4 z²) pixels. The map
-/// from target to image tells how far: with the dual conic of the dot, `D`, that of its image is `H D Hᵀ`, and its centre
-/// is in its last column. The map is that of the centres themselves, and is found again from the corrected ones. What a
-/// lens bends within one dot is left.
+/// centre: for a dot of diameter d at distance z seen under an angle t by about f d² sin t cos t / (4 z²) pixels. The
+/// shift follows from the map from target to image: with the dual conic of the dot, `D`, that of its image is `H D Hᵀ`,
+/// and its centre is in its last column. The map is that of the centres themselves, and is found again from the corrected
+/// ones. The distortion within one dot is neglected.
 ///
 /// Reference: Heikkilä 2000, "Geometric camera calibration using circular control points", section 3.
 pub(crate) fn image_of_centres(

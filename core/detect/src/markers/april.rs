@@ -15,14 +15,14 @@ use handeye_geometry::targets::{AprilGrid, AprilTag};
 /// Borders that are in use, in bits: Kalibr's, and that of nearly everyone else.
 const BORDERS: [usize; 2] = [2, 1];
 
-/// Tags within this many pitches say where another one is.
+/// Tags within this many pitches locate another one.
 const AROUND: f64 = 2.3;
 /// Least difference between white and black cells \[grey levels\].
 const MIN_CONTRAST: f64 = 15.0;
 /// Part of the cells that must be of the right colour: two codes of the weakest family differ in a fifth of theirs.
 const MIN_RIGHT: f64 = 0.98;
 
-/// The corners of all tags in sight that lie as the board has them, or of the one tag of a board of one.
+/// The corners of all tags in sight that are placed as on the board, or of the one tag of a board of one.
 pub(crate) fn find(image: &GrayImage, board: &AprilGrid, effort: Effort) -> Result<Option<Vec<Corner>>, VisionError> {
     let stated = board.border_bits.map(|bits| [bits]);
     let borders = stated.as_ref().map_or(&BORDERS[..], |bits| &bits[..]);
@@ -47,7 +47,7 @@ pub fn tags_in_sight(image: &GrayImage, tag: &AprilTag) -> Result<Vec<usize>, Vi
     Ok(ids.into_iter().collect())
 }
 
-/// The tags that lie as the board has them, and whether they stand upright, half a turn from how OpenCV reads them; `None`
+/// The tags that are placed as on the board, and whether they are upright, half a turn from how OpenCV reads them; `None`
 /// without any.
 fn placed(board: &AprilGrid, markers: &[Marker]) -> Option<(Vec<Placed>, bool)> {
     let place = |id: usize| board.place_of(id).map(|place| board.tag_corners(place));
@@ -65,7 +65,7 @@ fn placed(board: &AprilGrid, markers: &[Marker]) -> Option<(Vec<Placed>, bool)> 
     let mut seen = upright.into_iter().filter_map(|m| Some(Placed { on_target: place(m.id)?, marker: m }));
     match (seen.next(), seen.next()) {
         (Some(only), None) => Some((vec![only], turned)),
-        // Two tags of one number: which is the target, nobody knows.
+        // Two tags with the same number: it is not known which is the target's.
         _ => None,
     }
 }
@@ -102,8 +102,8 @@ fn overlooked(
     Ok(found)
 }
 
-/// Whether the cells of a tag are in the image where the map has them, and light all around it. `gap` is the distance
-/// to the next tag as a part of its side.
+/// Whether the cells of a tag are in the image where the map has them, with a light margin around it. `gap` is the
+/// distance to the next tag as a part of its side.
 fn shows(image: &GrayImage, map: &Matrix3<f64>, on_target: &[Vector2<f64>; 4], cells: &[bool], gap: f64) -> bool {
     // Cells are a square.
     let n = (cells.len() as f64).sqrt().round() as usize;

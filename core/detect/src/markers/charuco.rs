@@ -1,7 +1,7 @@
-//! `ChArUco` boards: markers tell which corner is which, the chessboard tells where it is.
+//! `ChArUco` boards: markers identify the corners, the chessboard locates them.
 //!
-//! A corner is looked for where the markers around it have it. Only those nearby are asked, so that a lens that bends
-//! the board as a whole does no harm; then the corner itself is fitted to the pixels.
+//! A corner is searched where the markers around it predict it. Only those nearby are used, so that distortion over the
+//! whole board does no harm; then the corner itself is fitted to the pixels.
 
 use image::GrayImage;
 use nalgebra::{Matrix3, Vector2};
@@ -15,13 +15,13 @@ use handeye_geometry::statistics::median_high;
 use handeye_geometry::targets::observation::Corner;
 use handeye_geometry::targets::{Charuco, Layout};
 
-/// Markers within this many squares of a corner say where it is.
+/// Markers within this many squares of a corner locate it.
 const AROUND: f64 = 2.3;
-/// Corners around that say where one without a marker is.
+/// Number of neighbouring corners that locate one without a marker.
 const NEIGHBOURS: usize = 5;
-/// How far from there it may be: a part of a square, and some pixels for corners of markers that are whole pixels.
+/// Largest distance from there: a part of a square, and some pixels for corners of markers that are whole pixels.
 const REACH: (f64, f64) = (0.15, 1.5);
-/// Smallest squares \[px\] whose corner is not a mere speck.
+/// Smallest squares \[px\] whose corner is large enough to measure.
 const MIN_SQUARE_PX: f64 = 6.0;
 /// A corner with less than this part of the usual contrast is half covered.
 const MIN_CONTRAST_PART: f64 = 0.3;
@@ -40,8 +40,9 @@ pub(crate) fn find(image: &GrayImage, board: &Charuco, effort: Effort) -> Result
     Ok(spread::is_enough(&corners, |index| board.grid().point(index)).then_some(corners))
 }
 
-/// Which layout the board in the image has; `None` when it is not there, or when the markers seen do not tell: those of
-/// one row lie the same way in both. Boards of an even number of inner rows have only one layout, [`Layout::New`] by name.
+/// Which layout the board in the image has; `None` when it is not there, or when the markers seen do not decide: those of
+/// one row are in the same places in both. Boards of an even number of inner rows have only one layout, [`Layout::New`] by
+/// name.
 ///
 /// # Errors
 /// As [`crate::detect`], without [`VisionError::OtherLayout`].
@@ -104,7 +105,7 @@ fn grow(image: &GrayImage, board: &Charuco, layout: Layout, found: &mut Vec<(Cor
                 .map(|(corner, _)| (board.grid().point(corner.index).coords.xy(), corner.px))
                 .filter(|(at, _)| (at - on_target).norm() < AROUND * board.square_m)
                 .collect();
-            // Three in a row and one beside it are the least that tells both directions.
+            // Three in a row and one next to it are the fewest that determine both directions.
             if pairs.len() < NEIGHBOURS {
                 continue;
             }
@@ -139,7 +140,7 @@ fn expected(board: &Charuco, layout: Layout, placed: &[Placed], index: usize) ->
     Some(expected_by(&homography(&pairs)?, board, layout, index))
 }
 
-/// A corner as a local map from the target to the image has it.
+/// A corner by a local map from the target to the image.
 fn expected_by(map: &Matrix3<f64>, board: &Charuco, layout: Layout, index: usize) -> Expected {
     let on_target = board.grid().point(index).coords.xy();
     let steps = jacobian(map, on_target) * board.square_m;

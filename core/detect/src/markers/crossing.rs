@@ -1,7 +1,7 @@
 //! One corner of a chessboard whose light squares have something printed in them.
 //!
-//! The model is that of [`crate::checkerboard::subpixel`]: two straight edges that cross, blurred. Only the pixels near the edges are
-//! used, a cross of arms as wide as the light margin around a marker, since what is beyond is no part of the model.
+//! The model is that of [`crate::checkerboard::subpixel`]: two straight edges that cross, blurred. Only the pixels near the edges
+//! are used, a cross of arms as wide as the light margin around a marker, since the model does not cover what is beyond.
 
 use image::GrayImage;
 use nalgebra::{Matrix2, SVector, Vector2};
@@ -32,7 +32,7 @@ const ROUNDING: f64 = 1.0 / 12.0;
 
 type Parameters = SVector<f64, 9>;
 
-/// Where a corner is expected, and what lies around it.
+/// Expected place of a corner, and its surroundings.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Expected {
     pub px: Vector2<f64>,
@@ -129,8 +129,8 @@ fn start(pixels: &[(Vector2<f64>, f64)], expected: &Expected) -> Parameters {
     Parameters::from_column_slice(&[0.0, 0.0, angles[0], angles[1], 0.7, level, 0.0, 0.0, contrast])
 }
 
-/// Of centre (2), angles of both normals, blur, level, relative gradient of the light
-/// (2) and contrast.
+/// Sums for centre (2), angles of both normals, blur, level, relative gradient of the light (2) and
+/// contrast.
 fn sums(pixels: &[(Vector2<f64>, f64)], x: &Parameters) -> Sums<9> {
     let scale = std::f64::consts::FRAC_1_SQRT_2 / x[4];
     let (n1, n2) = (Vector2::new(x[2].cos(), x[2].sin()), Vector2::new(x[3].cos(), x[3].sin()));

@@ -95,7 +95,7 @@ impl Scan<'_> {
         median_high(lines.iter().filter_map(|(_, _, levels)| difference(levels)))
     }
 
-    /// Where every line of pixels has its steepest steps of the right sign: along and across.
+    /// The steepest steps of the right sign on every line of pixels: along and across.
     pub fn steps(&self, edge: &Edge) -> Option<Vec<Vector2<f64>>> {
         let sign = if self.dark_beyond { -1.0 } else { 1.0 };
         let lines = self.lines(edge)?;
@@ -112,7 +112,7 @@ impl Scan<'_> {
         Some(places.collect())
     }
 
-    /// Where every line of pixels crosses the edge by its sum: along and across.
+    /// The crossing of the edge by the sum of every line of pixels: along and across.
     pub fn crossings(&self, edge: &Edge) -> Option<Vec<Vector2<f64>>> {
         let lines = self.lines(edge)?;
         let side = |pick: &dyn Fn(&[f64]) -> Option<f64>| {

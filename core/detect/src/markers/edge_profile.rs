@@ -27,7 +27,7 @@ pub(super) struct Profile<'a> {
     pub along: Vec<i64>,
     /// Deviation of the second coefficient of the curve a priori \[px\].
     pub bend: f64,
-    /// Least blur across the edge \[px\] of which the profile is true.
+    /// Least blur across the edge \[px\] for which the profile is valid.
     pub least_blur: f64,
 }
 

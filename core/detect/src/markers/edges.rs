@@ -2,10 +2,10 @@
 //!
 //! A corner of a tag has no half-turn symmetry, so that blur moves what most corner detectors call its place. Its edges
 //! are not moved. Every line of pixels across an edge has it where its steepest steps are, which needs no level to be
-//! known; a curve of second degree through these places is where a fit to all pixels begins, with a Gaussian blur,
-//! `I = m(s) + h(s) erf((x − c(s)) / √2 σ)`. Where the image is sharper than its pixels that profile is wrong, and the
-//! sum of the grey levels of each line says how much of it is dark, whatever the profile. Edges are bent as far as all
-//! of them together say that the lens bends them, and two of them meet in a corner. Small squares that touch the tag at
+//! known; a curve of second degree through these places is where a fit to all pixels begins, with a Gaussian blur, `I =
+//! m(s) + h(s) erf((x − c(s)) / √2 σ)`. Where the image is sharper than its pixels that profile is wrong, and the sum
+//! of the grey levels of each line shows how much of it is dark, whatever the profile. The bend of the edges by the
+//! lens is estimated from all of them together, and two of them meet in a corner. Small squares that touch the tag at
 //! its corners, as Kalibr prints them, lie beyond the ends of the edges and are not touched.
 
 use image::GrayImage;
@@ -15,7 +15,7 @@ use super::edge::{Edge, MIN_KEPT, Scan};
 use super::edge_profile::Profile;
 use handeye_geometry::statistics::median_high;
 
-/// What lies beyond the dark border and beyond the light gap reaches so far into them [px]: twice the usual blur.
+/// Content beyond the dark border and beyond the light gap reaches this far into them [px]: twice the usual blur.
 const BLUR_BEYOND_PX: f64 = 1.5;
 /// Narrowest border or gap \[px\].
 const NARROWEST_PX: f64 = 1.9;
@@ -27,18 +27,19 @@ const END_PX: f64 = 2.0;
 const MIN_CROSSINGS: usize = 5;
 /// Largest deviation of crossings from the curve [px RMS]: an outline without any blur has steps of a pixel, 0.29 px RMS.
 const MAX_RMS_PX: f64 = 0.5;
-/// Times that the window is laid again around the edge found: the first guess is off by a pixel or two.
+/// Number of times that the window is placed again around the found edge: the first guess has an error of one or two
+/// pixels.
 const PASSES: usize = 3;
 /// How far edges may be bent when nothing is known yet: their curvature times the width of the image. A wide lens
 /// (k₁ = −0.3 at a focal length of 0.8 widths) bends them by 0.3 at the border.
 const ANY_BEND: f64 = 1.0;
-/// What is believed of that before the edges are asked, and how many of them it is worth.
+/// Prior of that bend, and its weight as a number of edges.
 const USUAL_BEND: (f64, f64) = (0.1, 2.0);
 /// No lens is straighter than this.
 const LEAST_BEND: f64 = 0.01;
 /// Below this blur \[px\] the profile of an edge is that of the pixels' area, not Gaussian.
 const SHARP_PX: f64 = 0.5;
-/// An edge with less than this part of the usual contrast has something else beside it.
+/// An edge with less than this part of the usual contrast has another object next to it.
 const MIN_CONTRAST_PART: f64 = 0.6;
 /// Crossings are no better than this [px]: the grey levels of a pixel are not perfectly linear in its area.
 const FLOOR_PX: f64 = 0.01;
@@ -50,7 +51,7 @@ pub(crate) type Refined = (Vector2<f64>, Matrix2<f64>);
 /// dark border and `gap` that of the light around them, both as parts of a side. `None` for a corner at an edge that is
 /// covered or cut by the border of the image, and for squares too small for their blur.
 ///
-/// All edges are fitted twice: first bent at will; then no more than these say is usual in this image.
+/// All edges are fitted twice: first with any bend; then with no more than is usual in this image.
 pub(crate) fn refine(
     image: &GrayImage,
     squares: &[[Vector2<f64>; 4]],
@@ -78,7 +79,7 @@ pub(crate) fn refine(
     nearer.iter().zip(&edges).map(|(corners, edges)| crossings(corners, edges)).collect()
 }
 
-/// Where the edges of a square meet, not too far from where its corners were thought to be.
+/// Where the edges of a square meet, not too far from the assumed corners.
 fn crossings(corners: &[Vector2<f64>; 4], edges: &[Option<Edge>; 4]) -> [Option<Refined>; 4] {
     std::array::from_fn(|i| {
         let (before, after) = (edges[(i + 3) % 4].as_ref()?, edges[i].as_ref()?);
@@ -104,7 +105,7 @@ fn usual_bend<'a>(edges: impl Iterator<Item = &'a Edge>, width: f64) -> f64 {
     for edge in edges {
         let by_c2 = edge.curvature_by_c2() * width;
         let variance = edge.covariance[(2, 2)] * by_c2 * by_c2;
-        // Edges that tell less count for less.
+        // Edges with less information have less weight.
         let weight = 1.0 / (variance + USUAL_BEND.0 * USUAL_BEND.0).powi(2);
         sum += weight * ((edge.curve.z * by_c2).powi(2) - variance);
         weights += weight;
@@ -115,7 +116,7 @@ fn usual_bend<'a>(edges: impl Iterator<Item = &'a Edge>, width: f64) -> f64 {
     ((worth * usual * usual + count * seen) / (worth + count)).sqrt().max(LEAST_BEND)
 }
 
-/// The four sides of a square; `beside` is what is uniform on both sides of them, as a part of a side.
+/// The four sides of a square; `beside` is the width of the uniform area on both sides of them, as a part of a side.
 fn edges_of(image: &GrayImage, corners: &[Vector2<f64>; 4], beside: f64, curvature: f64) -> [Option<Edge>; 4] {
     std::array::from_fn(|i| {
         let (a, b) = (corners[i], corners[(i + 1) % 4]);
@@ -157,7 +158,8 @@ fn find(image: &GrayImage, a: Vector2<f64>, b: Vector2<f64>, reach: f64, curvatu
         // Once more in a window around what was found.
         return Some(profile.fit(&smooth).unwrap_or(smooth));
     }
-    // Too sharp, or something else beside the edge: its sums, if they agree as well as the steps do, or else the steps.
+    // Too sharp, or another object next to the edge: its sums, if they agree as well as the steps do, or else the
+    // steps.
     let by_sums = scan.crossings(&edge).and_then(|crossings| fitted(edge, &crossings, bend));
     Some(by_sums.map(|(edge, _)| edge).filter(|e| e.covariance[(0, 0)] <= edge.covariance[(0, 0)]).unwrap_or(edge))
 }

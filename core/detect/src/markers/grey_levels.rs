@@ -27,8 +27,8 @@ impl<const N: usize> Sums<N> {
     }
 }
 
-/// Levenberg–Marquardt from `x`, in at most so many steps, each held within what the model allows by `hold`; ends after a
-/// step of which `is_small` says so. `None` where the pixels do not tell the parameters apart.
+/// Levenberg–Marquardt from `x`, in at most `steps` steps, each limited to what the model allows by `hold`; ends after a
+/// step for which `is_small` is true. `None` where the pixels do not determine the parameters.
 pub(super) fn fit<const N: usize>(
     mut x: SVector<f64, N>,
     steps: usize,

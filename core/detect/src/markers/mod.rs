@@ -1,4 +1,4 @@
-//! Square markers: found and read by OpenCV, believed where several lie as the target has them.
+//! Square markers: found and read by OpenCV, accepted where several are placed as on the target.
 
 pub(crate) mod april;
 pub(crate) mod charuco;
@@ -22,10 +22,11 @@ use super::options::Effort;
 use handeye_geometry::planar_pose::homography::{homography, mapped};
 use handeye_geometry::targets::Dictionary;
 
-/// Markers this many pitches apart vouch for each other: next neighbours, also diagonally on a `ChArUco` board.
+/// Markers within this many pitches of each other confirm each other: next neighbours, also diagonally on a `ChArUco`
+/// board.
 const NEIGHBOURS: f64 = 2.1;
-/// How far off, as a part of its side, a marker may be from where its neighbour has it. Corners come to a pixel, and a
-/// lens bends; a marker in the next place is off by more than a whole side.
+/// Largest distance, as a part of its side, of a marker from where its neighbour expects it. Corners are known to a
+/// pixel, and a lens bends; a marker in the next place is off by more than a whole side.
 const MAX_OFF: f64 = 0.35;
 /// What is added to that for corners that are whole pixels.
 const MAX_OFF_PX: f64 = 1.5;
@@ -146,9 +147,9 @@ fn search(
     Ok(found)
 }
 
-/// The largest set of markers that lie to their neighbours as the target has them; `place` tells the corners of a marker
-/// on the target by its number. One marker alone has nobody to vouch for it, and where most markers of the target's
-/// numbers lie elsewhere it is another target: the set has two or more and the majority, or is empty.
+/// The largest set of markers that are placed relative to their neighbours as on the target; `place` gives the corners
+/// of a marker on the target by its number. A single marker has no neighbour to confirm it, and where most markers with
+/// the target's numbers are elsewhere it is another target: the set has two or more and the majority, or is empty.
 pub(super) fn in_place(
     markers: &[Marker],
     pitch_m: f64,
@@ -173,7 +174,7 @@ pub(super) fn in_place(
         return Vec::new();
     }
     let (mut out, others): (Vec<_>, Vec<_>) = all.into_iter().zip(&group).partition(|(_, g)| **g == best);
-    // Something in front may part a board. What lies where the largest part has it belongs to the board.
+    // An object in front may split a board. Markers where the largest part predicts them belong to the board.
     let pairs: Vec<_> = out.iter().flat_map(|(p, _)| p.pairs()).collect();
     if let Some(map) = homography(&pairs) {
         out.extend(others.into_iter().filter(|(p, _)| is_at(&map, p, 1.0)));
@@ -183,7 +184,7 @@ pub(super) fn in_place(
         return Vec::new();
     }
     out.sort_by_key(|p| p.marker.id);
-    // A number seen twice in one set is no reading to rely on.
+    // A number seen twice in one set is not reliable.
     let ids: Vec<usize> = out.iter().map(|p| p.marker.id).collect();
     out.retain(|p| ids.iter().filter(|id| **id == p.marker.id).count() == 1);
     out
@@ -194,7 +195,7 @@ fn agree(a: &Placed, b: &Placed, pitch_m: f64) -> bool {
     apart > 0.5 * pitch_m && apart <= NEIGHBOURS * pitch_m && (vouches(a, b) || vouches(b, a))
 }
 
-/// Whether the second marker is where the first one has it, seen straight or in perspective.
+/// Whether the second marker is where the first one expects it, seen straight or in perspective.
 fn vouches(a: &Placed, b: &Placed) -> bool {
     // Markers that differ much in size are not side by side.
     let ratio = a.marker.side_px() / b.marker.side_px();
@@ -222,7 +223,7 @@ fn affinity(pairs: &[(Vector2<f64>, Vector2<f64>)]) -> Option<Matrix3<f64>> {
     Some(Matrix3::new(u.x, u.y, u.z, v.x, v.y, v.z, 0.0, 0.0, 1.0))
 }
 
-/// Corners that are a pixel off swing what lies several sides away by as many pixels.
+/// Corners that are a pixel off move points several sides away by as many pixels.
 fn is_at(map: &Matrix3<f64>, placed: &Placed, sides_away: f64) -> bool {
     let off = placed.pairs().iter().map(|(on_target, px)| (mapped(map, *on_target) - px).norm_squared()).sum::<f64>();
     (off / 4.0).sqrt() <= MAX_OFF * placed.marker.side_px() + MAX_OFF_PX * sides_away.max(1.0)

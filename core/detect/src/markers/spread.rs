@@ -1,4 +1,4 @@
-//! Whether what is seen of a target fixes a pose.
+//! Whether the visible part of a target determines a pose.
 
 use nalgebra::{Matrix2, Point3, Vector2};
 

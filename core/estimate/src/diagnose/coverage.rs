@@ -28,7 +28,7 @@ pub struct Outline {
     pub px: Vec<Vector2<f64>>,
 }
 
-/// A view as coverage sees it.
+/// A view as input to the coverage.
 #[derive(Debug, Clone, Copy)]
 pub struct CoveredView<'a> {
     /// Name of the view, as findings cite it.
@@ -41,7 +41,7 @@ pub struct CoveredView<'a> {
 
 impl Coverage {
     /// Counts corners on `columns` × `rows` cells of equal size over an image of `width` × `height` pixels. Corners
-    /// outside the image, or not numbers, count nowhere; so does everything when there is no cell or no image.
+    /// that are outside the image or not finite are not counted; nothing is when there is no cell or no image.
     pub fn new<'a>(
         (width, height): (u32, u32),
         (columns, rows): (usize, usize),

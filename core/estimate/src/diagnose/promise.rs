@@ -1,4 +1,5 @@
-//! What a calibration promises, and is asked for: how near a tool arrives where the arm is known, else how near a point is measured.
+//! The error that a calibration promises and that goals refer to: how near a tool arrives where the arm is known, else how near a
+//! point is measured.
 
 use nalgebra::{DMatrix, Vector3};
 
@@ -13,34 +14,34 @@ use crate::uncertainty::quality::TipBox;
 use crate::{Fit, ViewStatus};
 use handeye_geometry::targets::TargetSpec;
 
-/// The error that a goal is asked of.
+/// The error that a goal refers to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Promised {
     /// 95 % of errors are below, metres.
     pub error_m: f64,
     /// The part of it that no view lowers, as far as it is known, metres.
     pub least_m: f64,
-    /// Error of what.
+    /// What the error is of.
     pub of: Promise,
 }
 
 /// What a promise is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Promise {
-    /// A point that the camera measures: of the arm nothing is known.
+    /// A point that the camera measures: nothing is known about the arm.
     Point,
     /// A tool that is sent to such a point, by commands as they are.
     Reach,
-    /// The same by a robot of which no more is known than how accurate it is said to be.
+    /// The same by a robot of which only the stated accuracy is known.
     ReachByAccuracy,
     /// The same by corrected commands.
     ReachCorrected,
 }
 
 impl Promised {
-    /// What a goal is asked of, from what a tool arrives within by commands as they are and by corrected ones and from the expected error
-    /// of a measured point, metres: commands as they are where these meet the goal, corrected ones else if they are better; a
-    /// point where of a tool nothing is known.
+    /// What a goal refers to, from what a tool arrives within by commands as they are and by corrected ones and from the expected
+    /// error of a measured point, metres: commands as they are where these meet the goal, corrected ones else if they are better; a
+    /// point where nothing is known about a tool.
     pub fn of(goal_m: f64, as_it_is_m: Option<f64>, corrected_m: Option<f64>, point_m: Option<f64>) -> Option<Self> {
         let Some(as_it_is) = as_it_is_m else {
             return point_m.map(|error_m| Self { error_m, least_m: 0.0, of: Promise::Point });
@@ -61,17 +62,17 @@ impl Promised {
 }
 
 impl Calibration {
-    /// How near a tool arrives, at points of the target where it was seen; `None` where neither the arm is known nor how accurate the robot
-    /// is, and where no error may be stated. An arm whose errors are contradicted by views left out is not known.
+    /// How near a tool arrives, at points of the target where it was seen; `None` where neither the arm is known nor how accurate
+    /// the robot is, and where no error may be stated. An arm whose errors are contradicted by views left out is not known.
     ///
-    /// What was found and the answer does not count on adds how far it would move the answer.
+    /// Findings that the answer does not account for add how far they would move the answer.
     pub fn reach_errors(&self) -> Option<ReachErrors> {
         let at = self.joint.as_ref()?.reference_point;
         Some(self.reach_at_target?.moved_by(self.stated.moved_m(&at)))
     }
 
-    /// The error of a measured point where the camera saw the target by the poses that the robot reports, 95 %, metres: what images and
-    /// poses say of each other does not depend on where the arm really is.
+    /// The error of a measured point where the camera saw the target by the poses that the robot reports, 95 %, metres: the
+    /// relation between images and poses does not depend on where the arm really is.
     pub fn error_by_poses_95_m(&self) -> Option<f64> {
         let joint = self.joint.as_ref()?;
         self.stated.error_95_m(self.hand_eye_covariance()?, joint.small_sample, &joint.reference_point)
@@ -83,13 +84,14 @@ impl Calibration {
         self.reach.as_ref().map(Reach::tool_length_m).or(by_accuracy)
     }
 
-    /// What was said of the robot, where [`Self::reach_errors`] counts on it: with joints that are known these say more.
+    /// What was stated about the robot, where [`Self::reach_errors`] uses it: joints, where they are known, give more.
     pub fn robot_accuracy(&self) -> Option<&RobotAccuracy> {
         self.reach_by_accuracy.as_ref().map(ReachByAccuracy::accuracy)
     }
 
-    /// The error that a goal \[m\] is asked of, see [`Promised::of`]. In a box that of its worst point: of a tool with a camera beside the
-    /// arm, of a measured point with one on it. `None` where nothing may be stated, or the arm gets to no point of the box.
+    /// The error that a goal \[m\] refers to, see [`Promised::of`]. In a box it is that of its worst point: for a tool with a
+    /// camera next to the robot, for a measured point with one on the arm. `None` where nothing may be stated, or the arm reaches
+    /// no point of the box.
     pub fn promised(&self, goal_m: f64, tool_box: Option<&TipBox>) -> Option<Promised> {
         let reach = match tool_box {
             None => self.reach_errors(),
@@ -114,8 +116,8 @@ impl Calibration {
         Some(Promised { least_m, ..promised })
     }
 
-    /// How the distance that a tool arrives within by corrected commands turns with what is not known, see [`Reach::weight`]. `None` where the arm is not known or gets to too few points, and where no commands are
-    /// corrected.
+    /// How the distance that a tool arrives within by corrected commands depends on what is not known, see [`Reach::weight`].
+    /// `None` where the arm is not known or reaches too few points, and where no commands are corrected.
     pub fn reach_weight(&self, tool_box: Option<&TipBox>) -> Option<DMatrix<f64>> {
         let points = tool_box.map(TipBox::corners_and_middle);
         let reach = self.reach.as_ref().filter(|reach| points.is_none() || reach.stands_still())?;
@@ -123,7 +125,7 @@ impl Calibration {
         reach.weight(points.as_ref().map(|points| &points[..]))
     }
 
-    /// Whether it is known how near a tool arrives at points of a camera beside the arm.
+    /// Whether it is known how near a tool arrives at points of a camera next to the robot.
     fn reaches_beside(&self) -> bool {
         let stands_still = |by_accuracy: &ReachByAccuracy| by_accuracy.stands_still();
         self.reach.as_ref().map_or(self.reach_by_accuracy.as_ref().is_some_and(stands_still), Reach::stands_still)
@@ -140,7 +142,7 @@ impl Calibration {
     }
 }
 
-/// The tool and the arm of a fit whose views are known; `None` where that gives no error of reach.
+/// The tool and the arm of a fit whose views are known; `None` where these give no error of reach.
 pub(super) fn reach(fit: &Fit, of_views: &ArmOfViews, target: &TargetSpec) -> Option<Reach> {
     let errors = fit.arm()?;
     let placement = &of_views.placement;
@@ -154,8 +156,8 @@ pub(super) fn reach(fit: &Fit, of_views: &ArmOfViews, target: &TargetSpec) -> Op
     Reach::new((&arm, errors), fit.hand_eye.as_ref()?, seen.collect(), target, &tool, is_its_own)
 }
 
-/// The robot of a calibration of which no more is known than how accurate it is, and how near a tool arrives at the target; `None` where
-/// its arm is known, and where no error may be stated.
+/// The robot of a calibration where only its accuracy is known, and how near a tool arrives at the target; `None` where its arm is
+/// known, and where no error may be stated.
 pub(super) fn reach_by_accuracy(
     calibration: &Calibration,
     wanted: &FindingOptions<'_>,
@@ -167,7 +169,7 @@ pub(super) fn reach_by_accuracy(
     let of_hand_eye = (calibration.hand_eye.as_ref()?, calibration.hand_eye_covariance()?, joint.small_sample);
     let used = calibration.views.iter().filter(|view| view.status == ViewStatus::Used);
     let views = used.filter_map(|view| view.camera_from_target).collect();
-    // The controller as it is has the pose-dependent error as well.
+    // The uncorrected controller has the pose-dependent error as well.
     let noise = joint.noise;
     let [field_m, field_rad] = if joint.field.is_some() { [noise.field_m, noise.field_rad] } else { [0.0; 2] };
     let shown = [noise.robot_m.hypot(field_m), noise.robot_rad.hypot(field_rad)];

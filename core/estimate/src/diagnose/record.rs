@@ -1,4 +1,4 @@
-//! A finding as it stands in a document.
+//! A finding as written in a document.
 
 use serde::{Deserialize, Serialize};
 

@@ -10,20 +10,20 @@ use handeye_geometry::se3;
 use handeye_geometry::targets::bent::{BoardPoints, BoardShape};
 use handeye_geometry::view_equations::{FreeParameters, PoseEquations, ViewInput};
 
-/// Steps of one minimisation; a handful is usual, but the rational model walks along a valley.
+/// Steps of one minimisation; a handful is usual, but the rational model converges slowly along a valley.
 const MAX_STEPS: usize = 100;
-/// Ends when the quadratic model promises less than this part of the cost.
+/// Ends when the quadratic model predicts a decrease of less than this part of the cost.
 const COST_TOLERANCE: f64 = 1e-13;
 /// Squared pixels per corner that are rounding: corners without noise end here.
 const ROUNDING_PX2: f64 = 1e-20;
 /// First damping relative to the diagonal.
 const FIRST_DAMPING: f64 = 1e-3;
-/// By how much the damping falls after a step that kept its promise. It has to fall fast: what the poses take from the
-/// information of the lens is all but a thousandth, so that a small damping still shortens the step.
+/// By how much the damping falls after a step that decreased the cost as predicted. It has to fall fast: the poses take
+/// all but a thousandth of the information on the lens, so that a small damping still shortens the step.
 const EASE: f64 = 1e-3;
-/// By how much it rises after a step that was no good.
+/// Factor by which it rises after a step that failed.
 const TIGHTEN: f64 = 10.0;
-/// From where it rises.
+/// Least damping from which it rises.
 const LEAST_RISE: f64 = 1e-8;
 /// Past this damping a step is too small to matter.
 const LARGEST_DAMPING: f64 = 1e10;
@@ -32,7 +32,7 @@ const MIRROR_STEPS: usize = 10;
 /// A mirrored pose is taken when it lowers the cost of its view by more than this part: less is rounding.
 const WORTHWHILE: f64 = 1e-6;
 
-/// What is given.
+/// The data and what is estimated from them.
 pub(super) struct Problem<'a> {
     pub views: &'a [SeenView<'a>],
     pub board: &'a BoardPoints,
@@ -52,7 +52,7 @@ pub(super) struct Estimate {
     pub intrinsics: Intrinsics,
     pub shape: BoardShape,
     pub poses: Vec<Isometry3<f64>>,
-    /// Near it, the other minimum of each, where there is one; empty before any was looked for.
+    /// For each pose the other minimum near it, where there is one; empty before any was searched for.
     pub mirrored: Vec<Option<Isometry3<f64>>>,
 }
 
@@ -104,8 +104,8 @@ impl Linear {
         Ok(all.cost.is_finite().then_some(all))
     }
 
-    /// Normal equations of the form without the poses: their matrix and gradient, and what the poses alone can take from
-    /// the cost. `None` where a view leaves its pose undetermined.
+    /// Normal equations of the form without the poses: their matrix and gradient, and the decrease of the cost by the
+    /// poses alone. `None` where a view leaves its pose undetermined.
     fn eliminate(&self, damping: f64) -> Option<(DMatrix<f64>, DVector<f64>, f64)> {
         let n = self.form_gradient.len();
         let (mut matrix, mut gradient, mut decrease) = (self.form.clone(), self.form_gradient.clone(), 0.0);
@@ -141,7 +141,7 @@ impl Linear {
         Some((matrix, gradient, decrease))
     }
 
-    /// The damped step from `estimate` and the decrease of the cost that it promises.
+    /// The damped step from `estimate` and the decrease of the cost that it predicts.
     fn step(&self, problem: &Problem<'_>, estimate: &Estimate, damping: f64) -> Option<(Estimate, f64)> {
         let (matrix, gradient, by_poses) = self.eliminate(damping)?;
         let n = gradient.len();
@@ -197,7 +197,7 @@ pub(super) fn minimise(problem: &Problem<'_>, estimate: &mut Estimate) -> Result
                 continue;
             };
             let negligible = COST_TOLERANCE * linear.cost + rounding;
-            // A damped step promises little because it is short.
+            // A damped step predicts little decrease because it is short.
             if promised <= negligible && damping < 1e-6 {
                 return Ok(Some(step));
             }
@@ -219,8 +219,8 @@ pub(super) fn minimise(problem: &Problem<'_>, estimate: &mut Estimate) -> Result
     Ok(Some(MAX_STEPS))
 }
 
-/// Tries the mirror image of every pose and keeps what fits better; whether any did. Both are minima of the cost, and the
-/// descent ends in the one nearer to its start.
+/// Tries the mirror image of every pose and keeps the one that fits better; returns whether any was replaced. Both are
+/// minima of the cost, and the descent ends in the one nearer to its start.
 pub(super) fn mirror_poses(problem: &Problem<'_>, estimate: &mut Estimate) -> Result<bool, IntrinsicsError> {
     let mut improved = false;
     let Estimate { intrinsics, shape, poses, mirrored } = estimate;

@@ -15,7 +15,7 @@ pub enum IntrinsicsError {
         /// Views needed.
         need: usize,
     },
-    /// The corners of a view fix no pose, by the index of the view.
+    /// The corners of a view do not determine a pose, by the index of the view.
     #[error(transparent)]
     Corners(#[from] PoseError),
     /// A list of whiteners of another length than that of the corners.
@@ -31,7 +31,7 @@ pub enum IntrinsicsError {
     /// The image size or the start is not usable.
     #[error("camera model: {source}")]
     BadStart {
-        /// What the model says.
+        /// The error of the camera model.
         #[from]
         source: CameraError,
     },
@@ -65,7 +65,7 @@ pub enum IntrinsicsError {
         /// Its standard deviation for 0.1 px of noise, in pixels.
         sigma_px: f64,
     },
-    /// The optimisation ended at numbers that are no camera.
+    /// The optimisation ended at numbers that are not a valid camera.
     #[error(
         "the calibration did not converge to a camera ({reason}); check the order of corners and the target's size"
     )]

@@ -1,4 +1,4 @@
-//! What the views say about the lens, and whether it is enough.
+//! The information of the views on the lens, and whether it is enough.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
@@ -15,8 +15,7 @@ const MAX_RELATIVE_SIGMA: f64 = 0.05;
 const MIN_EIGENVALUE: f64 = 1e-14;
 const PINHOLE_NAMES: [&str; 4] = ["fx", "fy", "cx", "cy"];
 
-/// The covariance that goes with an information matrix of `[fx fy cx cy, …]`; refuses one that leaves the pinhole
-/// undetermined.
+/// The covariance of an information matrix of `[fx fy cx cy, …]`; refuses one that leaves the pinhole undetermined.
 pub(super) fn covariance(information: &DMatrix<f64>, camera: &Intrinsics) -> Result<DMatrix<f64>, IntrinsicsError> {
     let covariance = inverse(information)?;
     for (i, (parameter, focal)) in

@@ -2,10 +2,10 @@
 //!
 //! # What it estimates
 //! Focal lengths, principal point and distortion of one lens model, the target's pose in every view and, where the corners
-//! show it or it is asked for, the bend of the target ([`BoardShape`]). The size of the target cannot be seen: one twice as
-//! large and twice as far away makes the same image. The estimate minimises the squared reprojection error
-//! `Σ ‖W (project(camera_from_target_i * point_j) − px_ij)‖²`, where `W` is the whitener of a corner, or the identity.
-//! For independent Gaussian noise of the corners that is the maximum of the likelihood.
+//! show it or it is requested, the bend of the target ([`BoardShape`]). The size of the target cannot be determined: one
+//! twice as large and twice as far away makes the same image. The estimate minimises the squared reprojection error
+//! `Σ ‖W (project(camera_from_target_i * point_j) − px_ij)‖²`, where `W` is the whitener of a corner, or the identity. For
+//! independent Gaussian noise of the corners that is the maximum of the likelihood.
 //!
 //! # How
 //! A start from homographies ([`start`]), then Levenberg–Marquardt on all unknowns at once, with analytic Jacobians and
@@ -13,9 +13,10 @@
 //! optimum every pose is tried against its mirror image, the second minimum that a flat target has. All sums run in the
 //! order of the views, so the same input gives the same bits.
 //!
-//! # How sure it is
-//! Corners of one view err alike, and then the covariance of independent ones is too small several times. What is stated
-//! rests on how the views scatter, and counts a bend that may be there unseen ([`Stated`], `docs/maths/camera_alone.md`).
+//! # How certain it is
+//! Corners of one view have common errors, and then the covariance of independent ones is several times too small. The
+//! stated uncertainty rests on the scatter of the views, and includes a bend that they may not show ([`Stated`],
+//! `docs/maths/camera_alone.md`).
 //!
 //! # Reference
 //! Zhang 2000, "A flexible new technique for camera calibration"; Triggs et al. 2000, "Bundle adjustment — a modern
@@ -50,10 +51,10 @@ use evidence::Evidence;
 pub const MIN_VIEWS: usize = 3;
 /// Normals of the target that agree within this angle \[deg\] in all views leave the focal length undetermined.
 const MIN_SPREAD_DEG: f64 = 2.0;
-/// Rounds of mirrored poses and optimum at the most; one is usual.
+/// Most rounds of mirrored poses and optimum; one is usual.
 const MIRROR_ROUNDS: usize = 4;
 
-/// What to estimate, and from where.
+/// What to estimate, and from which start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
     /// The lens model; its coefficients do not matter.
@@ -64,14 +65,14 @@ pub struct Options {
     pub bend: Bend,
 }
 
-/// What is thought of the bend of a target. A bent one that is taken for flat moves the camera by far more than the noise
-/// of its corners; a flat one that is taken for bent costs precision, most where views are few or little tilted.
+/// What is assumed about the bend of a target. A bent one that is taken for flat moves the camera by far more than the
+/// noise of its corners; a flat one that is taken for bent costs precision, most where views are few or little tilted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bend {
-    /// It is flat, and nothing is allowed for a bend.
+    /// It is flat, and no allowance is made for a bend.
     Never,
     /// It is estimated where the corners show one, which one flat target in a thousand does by chance; where they do not,
-    /// what is stated of the camera allows for one that they cannot show.
+    /// the stated uncertainty of the camera allows for one that they cannot show.
     IfShown,
     /// It is estimated.
     Always,
@@ -84,7 +85,7 @@ impl Options {
     }
 }
 
-/// A calibrated camera with the evidence.
+/// A calibrated camera with its uncertainty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
     /// The camera.
@@ -93,40 +94,40 @@ pub struct Found {
     pub shape: BoardShape,
     /// The target's pose in each view, in the order given.
     pub camera_from_target: Vec<Pose<Camera, Target>>,
-    /// Near it, the other minimum of the reprojection error that the flat target of a view has, where there is one.
+    /// For each pose the other minimum of the reprojection error of a flat target near it, where there is one.
     pub(crate) mirrored: Vec<Option<Isometry3<f64>>>,
     /// Root mean square of the 2-D residuals of each view, in the order given, pixels, without whiteners.
     pub rms_px: Vec<f64>,
-    /// The cost at the optimum, `Σ ‖W r‖²`: squared pixels where all corners count alike.
+    /// The cost at the optimum, `Σ ‖W r‖²`: squared pixels where all corners have equal weights.
     pub cost: f64,
     /// Number of corners in all views.
     pub corners: usize,
     /// Standard deviation per axis of a whitened residual, `√(cost / (2 corners − unknowns))`: pixels where all corners
-    /// count alike. Not a number where there are no more residuals than unknowns.
+    /// have equal weights. NaN where there are no more residuals than unknowns.
     pub sigma: f64,
     /// Covariance of `[fx fy cx cy, distortion…, warp x, warp y]` for whitened residuals of standard deviation 1; the
     /// warp only where it was estimated. The poses are unknowns in it, not constants.
     pub unit_covariance: DMatrix<f64>,
-    /// What may be stated of the camera and the bend, whatever the corners of a view have in common.
+    /// Uncertainty of the camera and the bend that may be stated, whatever errors the corners of a view share.
     pub stated: Stated,
     /// Steps of the optimiser.
     pub steps: usize,
 }
 
-/// How sure an estimate is, by how its views scatter.
+/// Uncertainty of an estimate by the scatter of its views.
 ///
 /// Errors that all views share (a lens model that does not follow the lens, a target that is not flat in another way than
 /// [`BoardShape`] bends) are not in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stated {
-    /// Of fx, fy, cx and cy, pixels: 1.96 of them hold the error in 95 % of cases. Not a number where there are no more
-    /// residuals than unknowns.
+    /// Standard deviations of fx, fy, cx and cy, pixels: the error is within 1.96 of them in 95 % of cases. NaN where
+    /// there are no more residuals than unknowns.
     pub pinhole_sigma_px: [f64; 4],
-    /// Of `ln(fx / fy)` likewise: fx and fy err alike, so it is known better than either.
+    /// The same for `ln(fx / fy)`: fx and fy have common errors, so it is known better than either.
     pub aspect_sigma: f64,
-    /// Of the two warps likewise, metres; `None` where the target was taken for flat.
+    /// The same for the two warps, metres; `None` where the target was taken for flat.
     pub warp_sigma_m: Option<[f64; 2]>,
-    /// Variance of the pinhole that the views show over that of corners that err independently.
+    /// Variance of the pinhole that the views show over that with independent corner errors.
     pub ratio: f64,
     /// Degrees of freedom of that ratio, at least 1.
     pub degrees_of_freedom: f64,
@@ -139,7 +140,7 @@ impl Found {
     }
 
     /// Covariance of `[fx fy cx cy, distortion…, warp x, warp y]` for independent corner noise of the size that the
-    /// residuals show; [`Found::stated`] has what holds when it is not independent.
+    /// residuals show; [`Found::stated`] holds when it is not independent.
     pub fn covariance(&self) -> DMatrix<f64> {
         &self.unit_covariance * (self.sigma * self.sigma)
     }
@@ -152,7 +153,7 @@ impl Found {
 /// views tilted by 20° or more.
 ///
 /// # Errors
-/// [`IntrinsicsError`] says what is missing and what to do. `cancel` is polled at every view.
+/// [`IntrinsicsError`] states what is missing and what to do. `cancel` is polled at every view.
 pub fn solve(
     views: &[SeenView<'_>],
     target: &TargetSpec,
@@ -196,7 +197,7 @@ pub fn solve(
     finish(&problem, estimate, steps, &evidence)
 }
 
-/// Turns round poses that ended as their mirror image. Returns the steps it took.
+/// Replaces poses that ended as their mirror image. Returns the number of steps taken.
 fn mirrored_back(problem: &Problem<'_>, estimate: &mut Estimate) -> Result<usize, IntrinsicsError> {
     let mut steps = 0;
     for _ in 0..MIRROR_ROUNDS {
@@ -255,7 +256,7 @@ fn finish(
     let unit_covariance = information::covariance(&information, &estimate.intrinsics)?;
     let unknowns = fitted + 6 * problem.views.len();
     let corners: usize = problem.views.iter().map(|v| v.corners.len()).sum();
-    // Four corners a view can leave no more equations than unknowns; then nothing is known of the noise.
+    // Four corners a view can leave no more equations than unknowns; then the noise is unknown.
     let freedom = (2 * corners).saturating_sub(unknowns);
     let sigma = if freedom > 0 { (evidence.cost / freedom as f64).sqrt() } else { f64::NAN };
     let rms_px = (0..problem.views.len()).map(|i| adjust::rms_px(problem, &estimate, i)).collect();
@@ -277,12 +278,12 @@ fn finish(
 fn stated(problem: &Problem<'_>, intrinsics: &Intrinsics, evidence: &Evidence) -> Stated {
     let pinhole = evidence.spread(0, 4);
     let warp = problem.free.warp.then(|| evidence.spread(problem.free.warp_at(intrinsics), 2));
-    // By fx, fy, cx and cy.
+    // Derivatives by fx, fy, cx and cy.
     let aspect = [intrinsics.fx.recip(), -intrinsics.fy.recip(), 0.0, 0.0];
     let aspect_left_out: f64 = (0..4).map(|i| aspect[i] * evidence.left_out(i)).sum();
     Stated {
         aspect_sigma: pinhole.sigma_along(&aspect).hypot(aspect_left_out),
-        // How far the bend that was left out would move the answer counts as an error of it.
+        // The effect of the bend that was left out on the answer counts as an error of it.
         pinhole_sigma_px: std::array::from_fn(|i| pinhole.sigma(i).hypot(evidence.left_out(i))),
         warp_sigma_m: warp.map(|warp| [warp.sigma(0), warp.sigma(1)]),
         ratio: pinhole.ratio,

@@ -14,7 +14,7 @@ use handeye_geometry::view_equations::{ViewInput, Whitener};
 
 /// Rounds of fitting and judging; two are usual where a corner is wrong.
 const ROUNDS: usize = 5;
-/// Rounds in which the worst corners of a view leave its pose.
+/// Rounds in which the worst corners of a view are left out of its pose.
 const POSE_ROUNDS: usize = 6;
 /// Corners go together when they are off by more than this part of the worst: one wrong corner drags its neighbours, which
 /// come back once it is gone.
@@ -22,7 +22,7 @@ const NEAR_WORST: f64 = 0.5;
 /// Steps of a pose without them.
 const POSE_STEPS: usize = 10;
 
-/// A camera, and what it was found without.
+/// A camera, and the corners left out of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Screened {
     /// The camera from the corners that are left.
@@ -31,12 +31,12 @@ pub struct Screened {
     pub aside: Vec<Vec<usize>>,
 }
 
-/// [`solve`] with the corners weighed by what their detector states, and without those that are simply wrong.
+/// [`solve`] with the corners weighted by what their detector states, and without those that are simply wrong.
 ///
 /// A corner is wrong when its residual, its view's own pose being free of it, is several times what nine in ten corners of
-/// all views have (`docs/maths/robust.md`). A view of which more than half would have to go is left whole: it is wrong, not
-/// its corners. Corners that were left out are judged again by the camera that is found without them, which may then have
-/// a bent target. `keep_all` leaves none out.
+/// all views have (`docs/maths/robust.md`). A view that would lose more than half is left whole: it is wrong, not its
+/// corners. Corners that were left out are judged again by the camera that is found without them, which may then have a
+/// bent target. `keep_all` leaves none out.
 ///
 /// # Errors
 /// As [`solve`].
@@ -75,7 +75,7 @@ pub fn solve_screened(
     Ok(now)
 }
 
-/// The wrong corners of every view by a camera, those included that it was found without.
+/// The wrong corners of every view by a camera, including those that were left out of it.
 fn wrong(views: &[&Corners], board: &BoardPoints, found: &Found) -> Vec<Vec<usize>> {
     let off = |corner: &Corner, pose: &Isometry3<f64>| {
         let point = pose * board.point(corner.index, &found.shape);

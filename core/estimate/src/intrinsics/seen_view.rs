@@ -8,12 +8,12 @@ use handeye_geometry::view_equations::Whitener;
 pub struct SeenView<'a> {
     /// At least [`MIN_CORNERS`](handeye_geometry::planar_pose::MIN_CORNERS) that do not lie on one line.
     pub corners: &'a [Corner],
-    /// How they count.
+    /// Their weights.
     pub whitener: &'a Whitener,
 }
 
 impl<'a> SeenView<'a> {
-    /// A view whose corners all count alike.
+    /// A view whose corners all have equal weights.
     pub fn unweighted(corners: &'a [Corner]) -> Self {
         Self { corners, whitener: &Whitener::Alike }
     }

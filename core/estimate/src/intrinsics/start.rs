@@ -18,12 +18,12 @@ const FOCAL_RANGE: (f64, f64) = (0.1, 20.0);
 const SWEEP_RATIO: f64 = 1.25;
 /// Views that judge the focal lengths of the sweep.
 const SWEEP_VIEWS: usize = 12;
-/// Steps of their poses: enough to tell which focal length is near.
+/// Steps of their poses: enough to determine which focal length is near.
 const SWEEP_STEPS: usize = 4;
 /// Most optimisations from the sweep.
 const SWEEP_STARTS: usize = 4;
 
-/// The map of the target's plane to the image in every view, `None` where the corners determine none.
+/// The map of the target's plane to the image in every view, `None` where the corners do not determine it.
 pub(super) struct Planes(Vec<Option<Matrix3<f64>>>);
 
 impl Planes {

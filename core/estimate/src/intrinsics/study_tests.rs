@@ -111,7 +111,7 @@ fn views_that_all_look_the_same_way_are_refused() {
 
 #[test]
 fn a_faint_tilt_is_not_sold_as_a_calibration() {
-    // 2.5° of tilt passes for different orientations, but says next to nothing about the focal length.
+    // 2.5° of tilt passes for different orientations, but hardly determines the focal length.
     let nearly = views(&camera(Distortion::None), 6, (0.04, 0.045), 0.1, 1);
     match calibrate(&nearly, Distortion::BrownConrady([0.0; 5]), None) {
         Err(IntrinsicsError::Undetermined { .. } | IntrinsicsError::NotACamera { .. }) => {}

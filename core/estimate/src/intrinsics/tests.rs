@@ -123,7 +123,7 @@ fn what_a_bend_would_do_is_known_without_a_fit_that_has_it() {
     let covariance = bent.covariance();
     let (from, to) = (flat.intrinsics.parameters(), bent.intrinsics.parameters());
     for i in 0..4 {
-        // What is not linear in a fifth of a millimetre is small against the noise.
+        // The nonlinear part for a fifth of a millimetre is small against the noise.
         let off = evidence.left_out(i) - (to[i] - from[i]);
         assert!(off.abs() < 0.05 * covariance[(i, i)].sqrt(), "{i}: {off}");
     }
@@ -147,7 +147,7 @@ fn independent_corners_scatter_as_much_as_expected() {
         ratio += found.stated.ratio / SESSIONS as f64;
         freedom += found.stated.degrees_of_freedom / SESSIONS as f64;
     }
-    // Four numbers of eight views, less what the fit takes of them.
+    // Four numbers of eight views, less those that the fit uses up.
     assert!((8.0..28.0).contains(&freedom), "{freedom}");
     let deviation = (2.0 / freedom / SESSIONS as f64).sqrt();
     assert!((ratio - 1.0).abs() < 3.5 * deviation, "{ratio} ± {deviation}");
@@ -204,7 +204,7 @@ fn a_pose_that_began_as_its_mirror_image_is_turned_round() {
         !adjust::mirror_poses(&problem, &mut estimate).expect("not cancelled"),
         "the optimum is the better of both"
     );
-    // Its mirror image, descended to where it rests.
+    // Its mirror image, descended to its minimum.
     let middle = Vector3::new(0.135, 0.09, 0.0);
     let start = mirrored(&poses[4], &middle).expect("it is tilted");
     let wrong = refine(&adjust::seen(&seen[4], &board, &found.shape, &found.intrinsics), &start, 50).expect("in front");

@@ -1,4 +1,4 @@
-//! What the lens of all sessions does beyond its model.
+//! Residual distortion of the lens of all sessions.
 
 use nalgebra::DMatrix;
 
@@ -12,7 +12,7 @@ use crate::handeye::joint::{JointSolution, ShownDistortion};
 use handeye_geometry::progress::Work;
 use handeye_geometry::targets::observation::View;
 
-/// Sessions with one lens, and with what it does beyond its model where they show it.
+/// Sessions with one lens, and with its residual distortion where they show one.
 pub struct Together {
     pub sessions: Vec<Fitted<Refit>>,
     pub lens: LensEstimate,
@@ -20,7 +20,7 @@ pub struct Together {
 }
 
 impl Together {
-    /// From the sessions with their lens and nothing beyond.
+    /// From the sessions with their lens and no residual distortion.
     pub fn new(
         names: &[NamedSession<'_>],
         prepared: &[Session<'_>],
@@ -56,7 +56,8 @@ impl Together {
         Ok(now)
     }
 
-    /// What every session says of the coefficients up to a degree, and all together; `None` where they say nothing.
+    /// Information of every session on the coefficients up to a degree, and of all together; `None` where they have
+    /// none.
     fn equations(
         &self,
         names: &[NamedSession<'_>],
@@ -77,7 +78,7 @@ impl Together {
         Ok(together.map(|together| (shares, together)))
     }
 
-    /// What the lens does beyond its model.
+    /// The residual distortion of the lens.
     pub fn shown(&self) -> Option<&ShownDistortion> {
         self.shown.as_ref().map(|(shown, _, _)| shown)
     }
@@ -90,7 +91,7 @@ impl Together {
         }
     }
 
-    /// A solution of session `i` with the uncertainty of what the lens does beyond its model.
+    /// A solution of session `i` with the uncertainty of the residual distortion.
     pub fn with_error(&self, i: usize, solution: JointSolution) -> JointSolution {
         match &self.shown {
             Some((shown, shares, equations)) => with_shared_error(solution, shares, i, equations, shown),
@@ -99,7 +100,7 @@ impl Together {
     }
 }
 
-/// A session fitted again with what the others say of the lens, with the same views, unknowns and widening.
+/// A session fitted again with the information of the others on the lens, with the same views, unknowns and widening.
 pub fn again(
     prepared: &Session<'_>,
     last: &Refit,

@@ -46,7 +46,7 @@ fn sessions_of_both_set_ups_state_one_lens_that_is_known_better_than_by_each() {
         let sigma = |it: &Fit| camera_of(it).sigma_px.expect("estimated")[0];
         assert!(sigma(calibration) < sigma(&own), "{} {}", sigma(calibration), sigma(&own));
         assert!(calibration.modelled_error_95_m() < own.modelled_error_95_m());
-        // What the shared lens leaves of a focal length by three sessions: five standard deviations are no chance.
+        // Error of a focal length with a lens shared by three sessions: five standard deviations are not chance.
         assert!((first.intrinsics.fx - 581.0).abs() < 5.0 * sigma(calibration), "{}", first.intrinsics.fx);
     }
 }
@@ -59,7 +59,7 @@ fn a_session_that_says_nothing_of_the_lens_leaves_the_other_as_it_is() {
     let sigma = own.camera.and_then(|camera| camera.sigma_px).expect("estimated");
     let parameters = |it: &Fit| it.intrinsics().expect("known").parameters();
     // Its lens is off by thirty of the other's standard deviations and counts a nine hundredth: a thirtieth each, of which
-    // five do not come by chance.
+    // five do not occur by chance.
     for (i, sigma) in sigma.iter().enumerate() {
         let off = (parameters(&together[0])[i] - parameters(&own)[i]).abs();
         assert!(off < 5.0 / 30.0 * sigma, "parameter {i}: {off} of {sigma}");
@@ -109,7 +109,7 @@ fn another_lens_is_a_warning_that_the_stated_error_counts_and_one_that_hardly_di
     let moved = own.moved_m(&first.joint.as_ref().expect("joint").reference_point);
     assert!(examined.tip_error_95_m().expect("stated") >= modelled + moved && moved > 0.0);
 
-    // Two thousandths are no other lens.
+    // Two thousandths are not another lens.
     for odd in &mut first.shared_lens.as_mut().expect("shared").odd {
         (odd.focal_px, odd.centre_apart_px) = (odd.others_focal_px * 1.002, 1.0);
     }

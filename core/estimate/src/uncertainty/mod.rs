@@ -1,4 +1,4 @@
-//! How well an answer is known, and whether the data bear out what is stated.
+//! How well an answer is known, and whether the data confirm what is stated.
 
 pub mod overdispersion;
 pub mod quality;

@@ -1,4 +1,4 @@
-//! What of a calibration is needed to predict what the camera sees.
+//! The part of a calibration that is needed to predict what the camera sees.
 
 use nalgebra::{DMatrix, Matrix6, Vector2};
 
@@ -19,7 +19,7 @@ use handeye_geometry::targets::depth_plane::DepthPlane;
 use handeye_geometry::targets::observation::{Corner, Corners, View};
 use handeye_geometry::view_equations::{DepthBias, MeasuredDepths, ViewInput, Whitener};
 
-/// What of a calibration is needed to predict.
+/// The part of a calibration that is needed to predict.
 #[derive(Debug, Clone)]
 pub struct Predictor {
     /// Both rigid links.
@@ -28,9 +28,9 @@ pub struct Predictor {
     pub intrinsics: Intrinsics,
     /// The shape of the target.
     pub shape: BoardShape,
-    /// What the points of the target are off their drawing, metres; empty where the calibration found nothing of the kind.
+    /// Print errors of the target's points, metres; empty where the calibration found none.
     pub print_errors_m: Vec<Vector2<f64>>,
-    /// Errors of the robot that depend on where it stands, where the calibration found them and they are not among those of the arm.
+    /// Pose-dependent errors of the robot, where the calibration found them and they are not among those of the arm.
     pub field: Option<PoseDependentError>,
     /// Errors of the robot's arm, where tip poses are corrected for them.
     pub arm: Option<ArmErrors>,
@@ -38,7 +38,7 @@ pub struct Predictor {
     pub hand_eye_covariance: Option<Matrix6<f64>>,
     /// How the error of the hand-eye transform is distributed in units of that covariance.
     pub small_sample: SmallSample,
-    /// What says how large errors may be; of a joint estimate.
+    /// The uncertainty of predictions; set for a joint estimate.
     pub uncertainty: Option<Uncertainty>,
 }
 
@@ -47,11 +47,11 @@ pub struct Predictor {
 pub struct Uncertainty {
     /// Noise levels of robot and corners.
     pub noise: Noise,
-    /// How corners count against each other, see [`JointFit::weights`](crate::JointFit::weights).
+    /// Weights of corners relative to each other, see [`JointFit::weights`](crate::JointFit::weights).
     pub weights: Option<CornerWeights>,
-    /// The errors of depths and how they count; `None` where the calibration does not count on them.
+    /// The errors of depths and their weight; `None` where the calibration does not use them.
     pub depths: Option<(DepthBias, DepthWeight)>,
-    /// What was estimated besides the links.
+    /// What was estimated in addition to the links.
     pub free: Free,
     /// Covariance of everything that predictions share, as in
     /// [`JointSolution::covariance`](crate::handeye::joint::JointSolution::covariance).
@@ -59,7 +59,8 @@ pub struct Uncertainty {
 }
 
 impl Predictor {
-    /// What is known exactly: a flat board of the size that is stated, and a robot without errors. States no uncertainty.
+    /// A predictor whose parameters are known exactly: a flat board of the stated size, and a robot without errors.
+    /// States no uncertainty.
     pub fn known(hand_eye: HandEye, intrinsics: Intrinsics) -> Self {
         Self {
             hand_eye,
@@ -87,7 +88,7 @@ impl Predictor {
             weights: joint.weights,
             depths: joint.depths.as_ref().and_then(|depths| {
                 let weight = depths.in_fit.weight()?;
-                // What no depth camera resolves is no error of a calibration.
+                // What no depth camera resolves is not an error of a calibration.
                 let px_per_m = weight.px_per_m.min(joint.noise.corner_px / resolution::DEPTH_M);
                 Some((depths.bias, DepthWeight { px_per_m, ..weight }))
             }),
@@ -109,8 +110,8 @@ impl Predictor {
         })
     }
 
-    /// The same with tip poses corrected for the errors of the arm, by the links, lens and target that go with them. `None` where the
-    /// calibration does not know them, see [`Fit::arm`](crate::Fit::arm).
+    /// The same with tip poses corrected for the errors of the arm, by the links, lens and target that belong to them. `None` where
+    /// the calibration does not have them, see [`Fit::arm`](crate::Fit::arm).
     pub fn of_arm(calibration: &Calibration) -> Option<Self> {
         let (arm, reported) = (calibration.arm()?, Self::new(calibration).ok()?);
         let uncertainty = reported.uncertainty?;
@@ -133,13 +134,13 @@ impl Predictor {
         })
     }
 
-    /// The points of the target as they are printed; those of another target are as they are drawn.
+    /// The points of the target as printed; those of another target as drawn.
     pub fn board(&self, target: &TargetSpec) -> BoardPoints {
         let drawn = BoardPoints::new(&target.points());
         if drawn.len() == self.print_errors_m.len() { drawn.displaced(&self.print_errors_m) } else { drawn }
     }
 
-    /// Where the tip is when the robot reports what it does in this view: with what is known of the robot's errors taken out.
+    /// The true tip pose for the pose that the robot reports in this view: with the known errors of the robot removed.
     ///
     /// # Errors
     /// [`VerifyError::NotFinite`]; [`VerifyError::NoJoints`] where the errors of the arm are known and its joints are not.
@@ -153,7 +154,7 @@ impl Predictor {
         Ok(corrected_base_from_tip(view, self.arm.as_ref(), self.field.as_ref()))
     }
 
-    /// Where the camera is when the tip is there.
+    /// Pose of the camera for a tip pose.
     pub fn base_from_camera(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Base, Camera> {
         match self.hand_eye {
             HandEye::EyeInHand { tip_from_camera, .. } => *base_from_tip * tip_from_camera,
@@ -161,7 +162,7 @@ impl Predictor {
         }
     }
 
-    /// Where the camera sees the board when the tip is there: the bare chain.
+    /// Pose of the board in the camera for a tip pose: the bare chain.
     pub fn camera_from_target(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Camera, Target> {
         camera_from_target(
             self.hand_eye.mode(),
@@ -171,7 +172,7 @@ impl Predictor {
         )
     }
 
-    /// How the corners of an image count.
+    /// Weights of the corners of an image.
     pub(super) fn whitener(&self, corners: &Corners) -> Whitener {
         let weights = self.uncertainty.as_ref().and_then(|uncertainty| uncertainty.weights);
         weights.map_or(Whitener::Alike, |weights| weights.whitener(corners))
@@ -197,10 +198,10 @@ impl Predictor {
     }
 
     /// The board's pose in one image, by its corners and the shape that the calibration found, from its pose as a flat
-    /// board of the stated size; by its depths too, where there are some and the calibration counts on them. That a board is 2 %
-    /// larger than stated puts it 2 % farther away.
+    /// board of the stated size; by its depths too, where there are some and the calibration uses them. A board that is 2 %
+    /// larger than stated is 2 % farther away.
     ///
-    /// `None` when that puts a corner behind the camera, or a corner is no point of this board.
+    /// `None` when that puts a corner behind the camera, or a corner is not a point of this board.
     pub fn seen(
         &self,
         board: &BoardPoints,

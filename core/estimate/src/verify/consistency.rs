@@ -2,14 +2,15 @@
 //!
 //! The pose error of a capture, `e_i = log(predicted⁻¹ * seen)`, is to first order
 //! `e_i = −G_i s − D_i d_i + n_i`: `s` the error of everything that the captures share (both links and whatever of lens,
-//! target, the robot's field and the errors of its arm is free, covariance `C`), `d_i` the robot's noise and `n_i` what corner noise does to PnP, with
-//! `J` and the pose as seen weighed by what the detector states of each corner, as in the fit. With
+//! target, the robot's field and the errors of its arm is free, covariance `C`), `d_i` the robot's noise and `n_i` the effect of
+//! corner noise on PnP, with `J` and the pose as seen weighted by the stated covariance of each corner, as in the fit. With
 //! `B_i = D_i Σ_robot D_iᵀ + (corner_px² + view_px²) (JᵀJ)⁻¹` all errors together have the covariance `diag(B_i) + G C Gᵀ`, and
-//! `χ² = eᵀ (diag(B) + G C Gᵀ)⁻¹ e` has `6 n` degrees of freedom: its expectation is `6 n` and its standard deviation
-//! `√(12 n)`. The inverse is by the matrix inversion lemma, so the cost is linear in the number of captures.
+//! `χ² = eᵀ (diag(B) + G C Gᵀ)⁻¹ e` has `6 n` degrees of freedom: its expectation is `6 n` and its standard deviation `√(12 n)`.
+//! The inverse is by the matrix inversion lemma, so the cost is linear in the number of captures.
 //!
 //! The noise levels are taken as known. From a dozen views they are known to a fifth, and the ratio as badly. They are at least
-//! what robots and cameras resolve ([`resolution`]): a simulated cell may be exact, and thousandths of a millimetre are no failure.
+//! what robots and cameras resolve ([`resolution`]): a simulated cell may be exact, and thousandths of a millimetre are not a
+//! failure.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, Vector6};
 
@@ -33,9 +34,9 @@ const LINKS: usize = 12;
 pub struct Consistency {
     /// χ² per degree of freedom; its expectation is 1.
     pub ratio: f64,
-    /// Six for every capture.
+    /// Number of degrees of freedom, six for every capture.
     pub degrees_of_freedom: usize,
-    /// What the ratio stays under in 99 of 100 cases when the stated uncertainty is true.
+    /// Limit that the ratio stays below in 99 of 100 cases when the stated uncertainty is true.
     pub limit: f64,
 }
 
@@ -67,7 +68,7 @@ pub struct Sums {
 }
 
 impl Sums {
-    /// `None` when the covariance is not one, or not of what this calibration is of.
+    /// `None` when the covariance is not valid, or not that of the unknowns of this calibration.
     pub fn new(calibrated: &Predictor, uncertainty: &Uncertainty) -> Option<Self> {
         let form = uncertainty.free.form();
         let slopes = calibrated.field.as_ref().map_or(0, |field| field.slopes().len());
@@ -91,7 +92,7 @@ impl Sums {
         })
     }
 
-    /// Adds a capture and returns its own ratio; `None`, and nothing added, when its corners determine no pose.
+    /// Adds a capture and returns its own ratio; `None`, and nothing added, when its corners do not determine a pose.
     pub fn add(
         &mut self,
         calibrated: &Predictor,

@@ -1,9 +1,9 @@
-//! A depth camera against the calibrated lens: how far its depths of the board are off where the board is.
+//! A depth camera against the calibrated lens: the error of its depths of the board.
 //!
-//! Where the board is in a capture is where the calibration has it, by robot and corners together
-//! ([`ViewResult::camera_from_target`](crate::ViewResult::camera_from_target)). A plane is laid through what the depths
-//! all over it are off: its height `d` in the middle of the board, its two slopes, and the scatter about it. The heights of all
-//! captures say
+//! The place of the board in a capture is that by the calibration, from robot and corners together
+//! ([`ViewResult::camera_from_target`](crate::ViewResult::camera_from_target)). A plane is fitted to the errors of the depths
+//! all over it: its height `d` in the middle of the board, its two slopes, and the scatter about it. The heights of all
+//! captures determine
 //!
 //! ```text
 //! d = offset + scale (z − z̄) + slope g
@@ -11,9 +11,10 @@
 //!
 //! with `z` the distance of the board along the optical axis, `z̄` the mean of that, and `g` by how much the depth of the board
 //! changes from one pixel to the next ([`DepthBias`](crate::DepthBias)): what a renderer's polygon offset, or a matcher
-//! that prefers the nearer or the farther pixel, adds. Captures scatter about that by more than their depths do (neighbours have the same error), so the scatter of the
-//! captures is what the uncertainty is from, by ordinary least squares. A focal length that is off puts the board off by the same
-//! part; its uncertainty is added. A target of another size than stated does the same, and nothing here knows.
+//! that prefers the nearer or the farther pixel, adds. Captures scatter about that by more than their depths do (neighbours have
+//! the same error), so the uncertainty follows from the scatter of the captures, by ordinary least squares. An error of the focal
+//! length displaces the board by the same part; its uncertainty is added. A target of another size than stated does the same, and
+//! cannot be detected here.
 
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector5};
 use statrs::distribution::{ContinuousCDF as _, StudentsT};
@@ -26,9 +27,9 @@ use handeye_geometry::targets::bent::BoardShape;
 use handeye_geometry::targets::depth_plane::{self, DepthPlane};
 use handeye_geometry::view_equations::{DepthBias, PredictedDepths};
 
-/// Captures that tell an offset from a scale and the slope's part, with three to spare for the scatter.
+/// Captures that separate an offset from a scale and the slope's part, with three more for the scatter.
 const FOR_SCALE: usize = 6;
-/// Chance that an error is called one that is none.
+/// Probability that an error is reported where there is none.
 const FALSE_ALARM: f64 = 1e-3;
 
 /// A number with its standard deviation.
@@ -40,7 +41,7 @@ pub struct Estimated {
     pub sigma: f64,
 }
 
-/// What the depths of many captures say of a depth camera.
+/// The errors of a depth camera by the depths of many captures.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthReport {
     /// Captures with depths of the board.
@@ -54,24 +55,24 @@ pub struct DepthReport {
     pub errors: Option<DepthErrors>,
 }
 
-/// How far depths are off.
+/// Errors of depths.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthErrors {
     /// Measured minus expected depth where the board is [`Self::at_m`] away and seen straight, metres.
     pub offset_m: Estimated,
     /// Mean distance of the board, metres.
     pub at_m: f64,
-    /// How much faster than the distance the depth grows: 0.001 is 1 mm in a metre. `None` for less than six captures.
+    /// Relative growth of the depth over the distance: 0.001 is 1 mm in a metre. `None` for less than six captures.
     pub scale: Option<Estimated>,
-    /// What is added to the depth of a slanted surface, in pixels' worth of its slope. `None` likewise.
+    /// What is added to the depth of a slanted surface, in pixels' worth of its slope. `None` in the same case.
     pub slope_px: Option<Estimated>,
-    /// How far the plane by depth is turned against the board about the camera's x and y, radians.
+    /// Rotation of the plane by depth against the board about the camera's x and y, radians.
     pub tilt_rad: [Estimated; 2],
     /// Scatter of single depths about the plane of a capture, metres.
     pub noise_m: f64,
     /// Scatter of the captures about offset, scale and slope, metres.
     pub between_m: f64,
-    /// Captures to spare.
+    /// Degrees of freedom of that scatter.
     pub degrees_of_freedom: usize,
 }
 
@@ -83,7 +84,7 @@ impl DepthReport {
 }
 
 impl DepthErrors {
-    /// Whether a number is none of chance: a false alarm in one of a thousand depth cameras.
+    /// Whether a number is not due to chance: a false alarm in one of a thousand depth cameras.
     pub(crate) fn is_certain(&self, of: Estimated) -> bool {
         let law = StudentsT::new(0.0, 1.0, self.degrees_of_freedom.max(1) as f64);
         law.is_ok_and(|law| of.value.abs() > of.sigma * law.inverse_cdf(1.0 - 0.5 * FALSE_ALARM))
@@ -111,18 +112,18 @@ struct Plane {
 }
 
 impl<'a> DepthCheck<'a> {
-    /// Of a lens, and of the target that the captures show.
+    /// A check with a lens and the target that the captures show.
     pub fn new(lens: &'a Intrinsics, target: &TargetSpec, shape: &'a BoardShape) -> Self {
         Self { lens, shape, middle: target.centre(), fills: Vec::new(), ratios: Vec::new(), planes: Vec::new() }
     }
 
-    /// Adds the depths of a capture in which the board is there.
+    /// Adds the depths of a capture with the board at this pose.
     pub fn add(&mut self, measured: &DepthPlane, camera_from_target: &Isometry3<f64>) {
         let expected = PredictedDepths::new(self.lens, self.shape, measured, &DepthBias::default(), camera_from_target);
         self.fills.push(measured.fill);
         self.ratios.push(measured.depth.x / expected.depth.x);
         let off = DepthPlane { depth: measured.depth - expected.depth, ..*measured };
-        // Along the board's x and y; the camera's x and y change with these as its axes lie.
+        // Along the board's x and y; the camera's x and y change with these by the direction of its axes.
         let rotation = camera_from_target.rotation.to_rotation_matrix().into_inner();
         let axes = rotation.fixed_view::<2, 2>(0, 0).transpose();
         let Some(by_camera) = axes.try_inverse().map(|inverse| inverse * off.depth.yz()) else { return };
@@ -131,15 +132,15 @@ impl<'a> DepthCheck<'a> {
             away_m,
             slope_m: expected.by_bias[2].x,
             off_m: off.depth_at(&self.middle),
-            // A turn about x takes what lies at positive y away, one about y brings what lies at positive x nearer.
+            // A turn about x moves what is at positive y away, one about y brings what is at positive x nearer.
             tilt_rad: [by_camera.y, -by_camera.x],
             variance_m2: measured.scatter_m.powi(2),
         });
     }
 
-    /// What all of them say, with the standard deviation of the focal length \[px\]; `None` without a capture that shows depths of
-    /// the board. Where a joint estimate was tried with the depths (`in_fit`), it is what that has them off by: its covariance knows what
-    /// lens and camera leave open, and the captures of an answer that counts on depths agree with them.
+    /// The result of all of them, with the standard deviation of the focal length \[px\]; `None` without a capture that shows
+    /// depths of the board. Where a joint estimate was tried with the depths (`in_fit`), the result is the errors in that estimate:
+    /// its covariance includes the uncertainty of lens and camera, and the captures of an answer that uses depths agree with them.
     pub fn finish(self, sigma_focal_px: f64, in_fit: Option<&DepthsInFit>) -> Option<DepthReport> {
         let ratio = median_high(self.ratios.iter().copied())?;
         let fill = self.fills.iter().sum::<f64>() / self.fills.len() as f64;
@@ -156,7 +157,7 @@ impl<'a> DepthCheck<'a> {
     }
 }
 
-/// What a joint estimate has the depths off by.
+/// Errors of the depths in a joint estimate.
 fn estimated_with(depths: &DepthsInFit, planes: &[Plane]) -> Option<DepthErrors> {
     let count = planes.len();
     let mean = |value: &dyn Fn(&Plane) -> f64| planes.iter().map(value).sum::<f64>() / count as f64;

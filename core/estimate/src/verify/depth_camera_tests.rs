@@ -9,8 +9,8 @@ use handeye_geometry::testing::BOARD;
 use handeye_simulate::links::normal;
 use handeye_simulate::moving_board::{Stage, centre, lens};
 
-/// Boards 0.3 to 0.6 m away, tilted by up to 40°, known to 0.05 mm and 0.02°, with depths that scatter by 0.3 mm and of which
-/// `change` has made something.
+/// Boards 0.3 to 0.6 m away, tilted by up to 40°, known to 0.05 mm and 0.02°, with depths that scatter by 0.3 mm and modified
+/// by `change`.
 fn report(seed: u64, count: usize, change: impl Fn(&Isometry3<f64>, usize, &mut f32)) -> Option<DepthReport> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut stage = Stage::new();
@@ -23,7 +23,7 @@ fn report(seed: u64, count: usize, change: impl Fn(&Isometry3<f64>, usize, &mut 
         let at = Vector3::new(0.0, 0.0, random.random_range(0.3..0.6));
         let board = Isometry3::from_parts(at.into(), UnitQuaternion::from_scaled_axis(tilt))
             * Translation3::from(-centre().coords);
-        // As robot and corners have it: off by what they leave open.
+        // The pose by robot and corners: off by their uncertainty.
         let sigma = [2e-5, 2e-5, 5e-5, 3e-4, 3e-4, 1e-4];
         let off = Vector6::from_fn(|axis, _| sigma[axis] * normal(&mut random));
         let found = board * Translation3::from(centre().coords) * se3::exp(&off) * Translation3::from(-centre().coords);
@@ -88,7 +88,7 @@ fn a_depth_camera_without_errors_is_accused_of_none() {
             all += 1;
         }
     }
-    // One of a thousand is expected; of two standard deviations, with five degrees of freedom, one of ten.
+    // One of a thousand is expected; at two standard deviations, with five degrees of freedom, one of ten.
     assert!(certain <= 1, "{certain} of {all}");
     assert!(beyond_two <= all / 5, "{beyond_two} of {all}: it states too little");
 }

@@ -1,5 +1,5 @@
-//! Verification with what a calibration finds out beside the links, the size of the board; and
-//! the law of measured points.
+//! Verification with what a calibration estimates in addition to the links, the size of the board; and the error
+//! distribution of measured points.
 
 use nalgebra::Point3;
 
@@ -15,7 +15,7 @@ use handeye_geometry::targets::bent::BoardShape;
 use handeye_geometry::testing::BOARD;
 use handeye_simulate::session::{ArmError, REALISTIC, Session, Setup, camera, session, trial};
 
-/// A print that is so much larger than stated, as one that a printer "fits to the page".
+/// A print that is larger than stated by this factor, as one that a printer "fits to the page".
 const SCALE: f64 = 1.024;
 const EXACT: Noise = Noise { corner_px: 0.0, robot_m: 0.0, robot_rad: 0.0, ..Noise::EXACT };
 
@@ -106,7 +106,7 @@ fn captures_are_predicted_by_corrected_tip_poses_as_well_as_the_errors_of_the_ar
     }
 }
 
-/// By finite differences over both ends of every principal axis.
+/// Checked by finite differences over both ends of every principal axis.
 #[test]
 fn the_covariance_of_a_point_counts_the_errors_of_the_arm_with_those_of_the_camera() {
     let (t, calibration) = off_by_its_links(Mode::EyeInHand, 91);
@@ -173,7 +173,7 @@ mod slow {
 
     #[test]
     fn a_found_scale_predicts_as_well_as_it_says() {
-        // As of the plain chain: 20 trials of 10 captures, mean ratio 1 with a spread of 0.06.
+        // As for the plain chain: 20 trials of 10 captures, mean ratio 1 with a spread of 0.06.
         let (mut mean, mut single, mut centre_m, mut stated) = (0.0, 0.0, 0.0, 0);
         for seed in 0..20 {
             let mut t = trial(Mode::EyeInHand, 40, &REALISTIC, camera(), 8100 + seed);

@@ -51,7 +51,8 @@ fn a_wrong_hand_eye_shows_in_millimetres_and_degrees_of_its_own_size() {
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
         let t = trial(mode, 5, &exact, camera(), 72);
         let mut wrong = truth(&t);
-        // 2 mm along the camera's x axis: every board is seen 2 mm beside its prediction, along x, the same in the base.
+        // 2 mm along the camera's x axis: every board is seen 2 mm away from its prediction, along x, the same in the
+        // base.
         let off = t.mount_from_camera.perturbed(&Vector6::new(0.002, 0.0, 0.0, 0.0, 0.0, 0.0));
         wrong.hand_eye = HandEye::new(mode, off, t.anchor_from_target);
         let v = check_all(&wrong, &t.views);
@@ -81,7 +82,7 @@ fn a_board_that_was_moved_scatters_little_and_is_predicted_badly() {
 
 #[test]
 fn errors_that_the_calibration_does_not_state_are_found() {
-    // The robot that is verified errs five times as much as the one that was calibrated.
+    // The robot that is verified has five times the errors of the one that was calibrated.
     let worse = Noise { robot_m: 5.0 * REALISTIC.robot_m, robot_rad: 5.0 * REALISTIC.robot_rad, ..REALISTIC };
     let t = trial(Mode::EyeInHand, 30, &REALISTIC, camera(), 74);
     let later = trial(Mode::EyeInHand, 10, &worse, camera(), 75);
@@ -90,8 +91,8 @@ fn errors_that_the_calibration_does_not_state_are_found() {
     assert!(!consistency.is_consistent() && consistency.ratio > 2.0 * consistency.limit, "{consistency:?}");
 }
 
-/// Edges along the rows of pixels without anti-aliasing, distance, blur: what a detector states of one image is not what it
-/// states of another.
+/// Edges along the rows of pixels without anti-aliasing, distance, blur: the stated covariances of one image are not those
+/// of another.
 #[test]
 fn captures_whose_corners_are_stated_to_be_worse_may_be_worse() {
     let exact = Noise { corner_px: 0.02, robot_m: 1e-5, robot_rad: 2e-5, ..Noise::EXACT };

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::CameraError;
 
-/// Largest distance in normalised coordinates that the inverse may leave: far below a thousandth of a pixel.
+/// Largest distance in normalised coordinates that the inverse may leave as error: far below a thousandth of a pixel.
 const INVERSE_TOLERANCE: f64 = 1e-12;
 /// Newton steps for the inverse; five are enough inside the model, the rest is for starts near the fold.
 const INVERSE_STEPS: usize = 50;
@@ -33,7 +33,7 @@ type Pair = [f64; 2];
 pub(super) struct Distorted {
     pub value: Pair,
     pub by_point: [Pair; 3],
-    /// Zero beyond those of the model.
+    /// Derivatives by the coefficients; zero beyond those of the model.
     pub by_coefficients: [Pair; 8],
 }
 
@@ -58,7 +58,7 @@ impl Distortion {
         }
     }
 
-    /// The model of that name with all coefficients zero; `None` for an unknown name.
+    /// The model with this name and all coefficients zero; `None` for an unknown name.
     pub fn from_name(name: &str) -> Option<Self> {
         match name {
             "none" => Some(Self::None),
@@ -135,7 +135,7 @@ fn normalise(p: &Vector3<f64>) -> Result<Vector2<f64>, CameraError> {
 /// A distortion of the plane z = 1 with its derivatives.
 struct Lens {
     value: Pair,
-    /// By x and by y of the plane.
+    /// Derivatives by x and by y of the plane.
     by_x: [Pair; 2],
     by_coefficients: [Pair; 8],
 }
@@ -172,7 +172,7 @@ fn polynomial(x: &Vector2<f64>, k: &[f64; 8]) -> Vector2<f64> {
     )
 }
 
-/// [`polynomial`] with its derivatives; `RATIONAL` says whether its denominator is free.
+/// [`polynomial`] with its derivatives; `RATIONAL` states whether its denominator is free.
 #[inline]
 fn polynomial_linearised<const RATIONAL: bool>([a, b]: Pair, k: &[f64; 8]) -> Lens {
     let [k1, k2, p1, p2, k3, k4, k5, k6] = *k;
@@ -247,7 +247,7 @@ fn undistort_polynomial(distorted: &Vector2<f64>, k: &[f64; 8]) -> Option<Vector
             }
             scale *= 0.5;
             if scale < 1e-6 {
-                // No descent left: either rounding has the last word, or there is no pre-image.
+                // No descent left: either rounding prevents it, or there is no pre-image.
                 return (residual.norm() < 1e3 * INVERSE_TOLERANCE).then_some(x);
             }
         }
@@ -288,7 +288,7 @@ fn fisheye_linearised(p: &Vector3<f64>, k: &[f64; 4]) -> Result<Distorted, Camer
     let (theta_d, slope) = fisheye_angle(theta, k);
     let over_r = 1.0 / r;
     let (a, b) = (p.x * over_r, p.y * over_r);
-    // The angle turns with the radius and with the depth; the direction only with what is across the radius.
+    // The angle changes with the radius and with the depth; the direction only with displacements across the radius.
     let over_d2 = 1.0 / (r2 + p.z * p.z);
     let (by_radius, by_depth) = (slope * p.z * over_d2, -slope * r * over_d2);
     let turn = theta_d * over_r;
@@ -321,7 +321,7 @@ fn undistort_fisheye(distorted: &Vector2<f64>, k: &[f64; 4]) -> Option<Unit<Vect
     Some(Unit::new_normalize(Vector3::new(direction.x * theta.sin(), direction.y * theta.sin(), theta.cos())))
 }
 
-/// The smallest angle with that distorted angle: marches up to bracket it, then Newton inside the bracket.
+/// The smallest angle with this distorted angle: marches up to bracket it, then Newton inside the bracket.
 fn invert_fisheye_angle(theta_d: f64, k: &[f64; 4]) -> Option<f64> {
     const MARCH: f64 = 0.05;
     let mut low = 0.0;

@@ -4,10 +4,10 @@ use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 
 use super::{Distortion, Intrinsics};
 
-/// Directions from the principal point that are followed, besides those to the corners of the image. Tangential
-/// distortion turns the place of a fold slowly with the direction.
+/// Directions from the principal point that are followed, in addition to those to the corners of the image. With
+/// tangential distortion the place of a fold changes slowly with the direction.
 const DIRECTIONS: u32 = 72;
-/// Steps from the optical axis to 90° beside it; one is a pixel or two of a usual camera.
+/// Steps from the optical axis to 90° off it; one is a pixel or two of a usual camera.
 const STEPS: u32 = 1000;
 
 /// The lens model turns back within the image, so that pixels beyond have no ray, or that of another pixel.
@@ -22,19 +22,19 @@ const STEPS: u32 = 1000;
 pub struct FoldsBack {
     /// The model with its coefficients.
     pub distortion: Distortion,
-    /// Distance from the principal point at which it does, pixels.
+    /// Distance from the principal point at which it folds back, pixels.
     pub radius_px: f64,
     /// Distance of the farthest corner of the image, pixels.
     pub reach_px: f64,
 }
 
 impl Intrinsics {
-    /// Checks that the lens model is a lens all over the image: that the determinant of the derivative of the pixel by the
-    /// direction is positive on the way from the optical axis to every edge. A polynomial may turn back (`d r_distorted /
-    /// d r ≤ 0`), and then two rays meet in one pixel, and pixels farther out have none.
+    /// Checks that the lens model is valid all over the image: that the determinant of the derivative of the pixel by the
+    /// direction is positive on the way from the optical axis to every edge. A polynomial may turn back
+    /// (`d r_distorted / d r ≤ 0`), and then two rays meet in one pixel, and pixels farther out have none.
     ///
-    /// Directions 90° and more beside the axis are not looked at: a fisheye's image of them is a circle whose edge the
-    /// model does not know, and what lies beyond is black.
+    /// Directions 90° and more off the axis are not checked: a fisheye's image is a circle whose edge is not in the
+    /// model, and what is beyond is black.
     ///
     /// # Errors
     /// The fold that is nearest to the principal point.
@@ -68,7 +68,7 @@ impl Intrinsics {
             let there = self.linearise(&ray).ok()?;
             let by_point = Matrix2x3::from(there.by_point);
             let px = Vector2::from(there.px);
-            // Not a number past a pole of the rational model, which is a fold too.
+            // NaN past a pole of the rational model, which is a fold too.
             let slope = Matrix2::from_columns(&[by_point * outward, by_point * around]).determinant();
             if slope.is_nan() || slope <= 0.0 {
                 return self.contains(&px).then_some(px);
@@ -117,7 +117,7 @@ mod tests {
 
     #[test]
     fn a_lens_is_refused_from_the_radius_on_that_its_image_reaches() {
-        // Corners of the image are 400 px away: a fold just beyond is none of its pixels, one just inside is.
+        // Corners of the image are 400 px away: a fold just beyond is outside the image, one just inside is not.
         for (fold_px, folds) in [(404.0, false), (396.0, true)] {
             let k1 = -(400.0f64 * 2.0 / 3.0 / fold_px).powi(2) / 3.0;
             let lens = camera(Distortion::BrownConrady([k1, 0.0, 0.0, 0.0, 0.0]));
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn a_fold_that_turns_out_again_is_one() {
-        // k3 > 0 brings the radius back out: every pixel has a ray, some have three.
+        // k3 > 0 makes the radius grow again: every pixel has a ray, some have three.
         let lens = camera(Distortion::BrownConrady([-1.0, 0.0, 0.0, 0.0, 0.3]));
         assert!(matches!(lens.check_fold(), Err(FoldsBack { .. })));
     }

@@ -20,11 +20,11 @@ pub const MAX_PARAMETERS: usize = 12;
 /// Derivative of a pixel by the camera's parameters; columns past [`Intrinsics::parameter_count`] are zero.
 pub(crate) type PixelByParameters = SMatrix<f64, 2, MAX_PARAMETERS>;
 
-/// What a camera model cannot do with a point or a pixel.
+/// Why a camera model cannot handle a point or a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum CameraError {
-    /// The point has no image: it lies on or behind the camera plane.
+    /// The point has no image: it is on or behind the camera plane.
     #[error("point at z = {z_m} m is not in front of the camera")]
     BehindCamera {
         /// Its depth in metres.
@@ -41,7 +41,7 @@ pub enum CameraError {
     /// Focal length, size or coefficients are not usable numbers.
     #[error("camera parameter {name} = {value} is not usable: it must be finite, focal lengths and sizes positive")]
     BadParameter {
-        /// Which one.
+        /// Name of the parameter.
         name: &'static str,
         /// The value of the parameter, pixels or without a unit.
         value: f64,
@@ -110,10 +110,10 @@ impl Intrinsics {
         Self::pinhole(width, height, half_side / (angle_rad / 2.0).tan())
     }
 
-    /// Checks that every number can be computed with.
+    /// Checks that every number is usable.
     ///
     /// # Errors
-    /// [`CameraError::BadParameter`] names the first that cannot.
+    /// [`CameraError::BadParameter`] names the first that is not.
     pub fn validate(&self) -> Result<(), CameraError> {
         let positive =
             [("width", f64::from(self.width)), ("height", f64::from(self.height)), ("fx", self.fx), ("fy", self.fy)];
@@ -162,7 +162,7 @@ impl Intrinsics {
     /// The pixel of a point in camera coordinates, in metres.
     ///
     /// # Errors
-    /// [`CameraError::BehindCamera`]; the fisheye model alone sees points beside and behind its plane.
+    /// [`CameraError::BehindCamera`]; only the fisheye model sees points on and behind its plane.
     pub fn project(&self, point: &Point3<f64>) -> Result<Vector2<f64>, CameraError> {
         let distorted = self.distortion.distort(&point.coords)?;
         Ok(Vector2::new(self.fx * distorted.x + self.cx, self.fy * distorted.y + self.cy))

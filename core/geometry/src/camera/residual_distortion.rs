@@ -1,17 +1,17 @@
-//! What a lens does beyond its model: a smooth field of displacements over the image.
+//! Residual distortion of a lens beyond its model: a smooth field of displacements over the image.
 //!
 //! `measured = project(point) + field(measured)`, where both components of the field are polynomials of one total degree,
 //! products of Legendre polynomials in the two coordinates of the image, each from −1 to 1 and of mean square one.
 
 use nalgebra::Vector2;
 
-/// Displacement of an image point by what the lens model does not follow.
+/// Displacement of an image point that the lens model does not describe.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResidualDistortion {
     /// Width and height of the image, pixels.
     size: (u32, u32),
     degree: usize,
-    /// Of each function along x, and then along y, pixels.
+    /// Coefficients of each function along x, and then along y, pixels.
     coefficients: Vec<f64>,
 }
 
@@ -23,8 +23,8 @@ pub const fn functions(degree: usize) -> usize {
     (degree + 1) * (degree + 2) / 2
 }
 
-/// The polynomials up to a degree at a place of the image, in rising total degree: those of a lower degree come first.
-/// Beyond the image they are what they are at its edge.
+/// The polynomials up to a degree at a place of the image, by increasing total degree: those of a lower degree come
+/// first. Beyond the image they have the values at its edge.
 pub fn basis(size: (u32, u32), degree: usize, px: &Vector2<f64>) -> Vec<f64> {
     let along = |at: f64, length: u32| {
         // Pixel centres are whole numbers.
@@ -47,7 +47,8 @@ fn legendre(degree: usize, x: f64) -> Vec<f64> {
 }
 
 impl ResidualDistortion {
-    /// By its coefficients \[px\]: those of the displacement along x of every function, and then those along y.
+    /// A field with these coefficients \[px\]: those of the displacement along x of every function, and then those
+    /// along y.
     pub fn new(size: (u32, u32), degree: usize, coefficients: Vec<f64>) -> Self {
         Self { size, degree, coefficients }
     }
@@ -57,12 +58,12 @@ impl ResidualDistortion {
         self.degree
     }
 
-    /// Of each function along x, and then along y, pixels.
+    /// Coefficients of each function along x, and then along y, pixels.
     pub fn coefficients(&self) -> &[f64] {
         &self.coefficients
     }
 
-    /// How far a point that is measured at `px` lies from where the lens model puts it, pixels.
+    /// Displacement of a point that is measured at `px` from its place by the lens model, pixels.
     pub fn at(&self, px: &Vector2<f64>) -> Vector2<f64> {
         let basis = basis(self.size, self.degree, px);
         let (along_x, along_y) = self.coefficients.split_at(basis.len());

@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Matrix3, SMatrix, SymmetricEigen, Vector2, Vector3};
 
 /// Fewest pairs that determine a map: eight numbers, two of each pair.
 const MIN_PAIRS: usize = 4;
-/// Points leave more than one map when the second smallest eigenvalue of the equations is less than this part of the
+/// Points do not determine one map when the second smallest eigenvalue of the equations is less than this part of the
 /// largest: less than a millionth in the equations themselves, where the rounding of pixels begins.
 const MIN_DETERMINED: f64 = 1e-12;
 
@@ -18,8 +18,8 @@ const MIN_DETERMINED: f64 = 1e-12;
 /// Each pair gives two equations that are linear in the nine numbers of `H`: `q_x (h₃ · m) = h₁ · m` and
 /// `q_y (h₃ · m) = h₂ · m` with `m = [p, 1]` and the rows `h` of `H`. The unit vector that leaves the smallest sum of
 /// squares is the eigenvector of the smallest eigenvalue of their normal matrix, which consists of four sums of `m mᵀ`.
-/// Both sets of points are moved to their mean and scaled to unit size before, without which the numbers would span ten
-/// orders; squaring the equations then costs no digits of the eigenvector, since the next eigenvalue is far.
+/// Both sets of points are moved to their mean and scaled to unit size first, otherwise the numbers would span ten
+/// orders; squaring the equations then costs no digits of the eigenvector, since the next eigenvalue is far away.
 ///
 /// # Reference
 /// Hartley 1997, "In defense of the eight-point algorithm"; Hartley & Zisserman 2004, algorithm 4.2.
@@ -60,13 +60,13 @@ pub fn homography(pairs: &[(Vector2<f64>, Vector2<f64>)]) -> Option<Matrix3<f64>
     map.iter().all(|x| x.is_finite()).then_some(map)
 }
 
-/// Where the map takes a point; infinite for a point of its horizon.
+/// Image of a point under the map; infinite for a point of its horizon.
 pub fn mapped(map: &Matrix3<f64>, p: Vector2<f64>) -> Vector2<f64> {
     let q = map * Vector3::new(p.x, p.y, 1.0);
     Vector2::new(q.x, q.y) / q.z
 }
 
-/// How the image of a point moves with the point.
+/// Jacobian of the image of a point by the point.
 pub fn jacobian(map: &Matrix3<f64>, p: Vector2<f64>) -> Matrix2<f64> {
     let q = map * Vector3::new(p.x, p.y, 1.0);
     let at = Vector2::new(q.x, q.y) / q.z;

@@ -3,7 +3,7 @@
 //! # What it estimates
 //! `camera_from_target`, metres and radians, by least squares on the reprojection error in pixels, through any lens model of
 //! [`crate::camera`]. A plane seen from afar looks the same when its normal is mirrored at the line of sight, so that the
-//! error has two minima; both are found, each to rounding, and the smaller one counts as the better.
+//! error has two minima; both are found, to rounding accuracy, and the one with the smaller error counts as the better.
 //!
 //! # How
 //! 1. [`homography`]: the map from the target's plane to the rays of the corners;
@@ -11,8 +11,8 @@
 //! 3. [`refine`]: Levenberg–Marquardt from either, with the lens's own Jacobians, and with the target's own shape where it
 //!    is known to be bent.
 //!
-//! Everything in the crate that needs the pose of a view goes through these; [`mirror`] has the second minimum from a pose
-//! that is known.
+//! Everything in the crate that needs the pose of a view goes through these; [`mirror`] has the second minimum from a
+//! known pose.
 //!
 //! # Reference
 //! Collins & Bartoli 2014, "Infinitesimal plane-based pose estimation", IJCV 109, for the two starts; Schweighofer & Pinz
@@ -32,29 +32,29 @@ use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::Corner;
 use crate::view_equations::{ViewInput, Whitener};
 
-/// Corners that fix a planar pose.
+/// Number of corners that determine a planar pose.
 pub const MIN_CORNERS: usize = 4;
-/// Ratio of extents below which corners are taken for collinear.
+/// Ratio of extents below which corners count as collinear.
 const MIN_FLATNESS: f64 = 1e-4;
 /// Steps of one descent: a few usually, and hundreds along the valley between two minima that are about to merge.
 const MAX_STEPS: usize = 500;
 /// Minima whose errors per corner differ by less than this, pixels, differ by rounding.
 const SAME_ERROR_PX: f64 = 1e-9;
-/// Two solutions closer than this angle \[rad\] are one: a tenth of what corner noise of 0.1 px does to a pose.
+/// Two solutions closer than this angle \[rad\] are one: a tenth of the effect of 0.1 px of corner noise on a pose.
 const SAME_ROTATION: f64 = 1e-4;
 
 /// Excess of the squared error of one minimum over the other, in units of the noise of a corner, up to which both are
 /// possible. Let the true minimum be `D` better without noise; with it the difference has mean `D` and deviation `2 √D`, so
 /// that the true one is worse by more than `x` with the probability `Φ(−(x + D) / (2 √D))`, at most `Φ(−√x)` whatever `D`.
-/// This `x` makes it one view in a million when corners err independently, and one in a thousand where what they share
-/// makes the noise of a pose one and a half times as large.
+/// This `x` makes it one view in a million with independent corner errors, and one in a thousand where shared errors make
+/// the noise of a pose one and a half times as large.
 const POSSIBLE_EXCESS: f64 = 4.75 * 4.75;
 
 /// Why corners have no pose.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum PoseError {
-    /// The distance between points is not a length.
+    /// The distance between points is not a valid length.
     #[error("the target's point distance of {square_m} m is not usable: it must be finite and positive")]
     BadSquare {
         /// Its value in metres.
@@ -70,7 +70,7 @@ pub enum PoseError {
         /// Corners needed.
         need: usize,
     },
-    /// A corner that is not a point of the target, is listed twice, or is not a number.
+    /// A corner that is not a point of the target, is listed twice, or is NaN.
     #[error("view {view}: corner {index} at ({u_px}, {v_px}) px {reason}")]
     BadCorner {
         /// Index of the view, 0 where there is only one.
@@ -81,10 +81,10 @@ pub enum PoseError {
         u_px: f64,
         /// Its row in pixels.
         v_px: f64,
-        /// What is wrong with it.
+        /// What is wrong with the corner.
         reason: &'static str,
     },
-    /// All corners of the view lie on one line, in the image or on the target, so that they fix no pose.
+    /// All corners of the view lie on one line, in the image or on the target, so that they do not determine a pose.
     #[error("view {view}: the corners lie on one line and fix no pose")]
     CollinearCorners {
         /// Index of the view, 0 where there is only one.
@@ -99,7 +99,7 @@ pub enum PoseError {
     /// The camera model cannot be used or has no ray for a corner.
     #[error("camera model: {source}")]
     Camera {
-        /// What the model says.
+        /// The error of the model.
         #[from]
         source: CameraError,
     },
@@ -134,8 +134,8 @@ pub struct PlanarPose {
 }
 
 impl PlanarPose {
-    /// The alternative, where so many corners with noise of `sigma_px` per axis leave it possible that it is the pose, and
-    /// not `best`: whoever knows more of the view than its corners has to choose. At most one true pose in a million is
+    /// The alternative, where with this many corners and noise of `sigma_px` per axis it may be the true pose instead of
+    /// `best`: the choice needs more information than the corners of the view. At most one true pose in a million is
     /// missed.
     pub fn possible_alternative(&self, corners: usize, sigma_px: f64) -> Option<Solution> {
         let excess = |a: &Solution| corners as f64 * (a.rms_px.powi(2) - self.best.rms_px.powi(2));
@@ -149,7 +149,7 @@ impl PlanarPose {
         sigma_px(self.best.rms_px, corners)
     }
 
-    /// Of the poses that the corners leave possible, by their own noise, the one turned less from `expected`.
+    /// The pose nearer in rotation to `expected`, of those that are possible by the noise of the corners.
     pub fn nearer_to(&self, expected: &Pose<Camera, Target>, corners: usize) -> Solution {
         match self.possible_alternative(corners, self.sigma_px(corners)) {
             Some(other) if is_nearer(&other.camera_from_target, &self.best.camera_from_target, expected) => other,
@@ -164,13 +164,14 @@ pub fn sigma_px(rms_px: f64, corners: usize) -> f64 {
     rms_px * (corners as f64 / (numbers - 6.0).max(1.0)).sqrt()
 }
 
-/// Whether a pose is turned less from the expected one than another: the two of a flat target differ in their rotation.
+/// Whether a pose is nearer in rotation to the expected one than another: the two of a flat target differ in their
+/// rotation.
 pub fn is_nearer(pose: &Pose<Camera, Target>, than: &Pose<Camera, Target>, expected: &Pose<Camera, Target>) -> bool {
     let turned = |pose: &Pose<Camera, Target>| pose.rotation().angle_to(&expected.rotation());
     turned(pose) < turned(than)
 }
 
-/// The best of [`solve`] by the corners alone, where nothing else is known of the view.
+/// The best of [`solve`] by the corners alone, where nothing else is known about the view.
 ///
 /// # Errors
 /// As [`solve`].
@@ -187,8 +188,8 @@ pub fn camera_from_target(
 /// target behind the camera is dropped.
 ///
 /// # Needs
-/// Four corners, no three of them on one line where there are no more; more than half of them may not lie beyond 87° from
-/// the optical axis. Solutions that fall together, as those of a target seen head-on, count as one.
+/// Four corners, no three of them on one line where there are no more; more than half of them may not be beyond 87° from
+/// the optical axis. Solutions that coincide, as those of a target seen head-on, count as one.
 ///
 /// # Errors
 /// [`PoseError::TooFewCorners`], [`PoseError::BadCorner`], [`PoseError::BadSquare`], [`PoseError::CollinearCorners`],
@@ -228,7 +229,7 @@ pub fn other(seen: &ViewInput<'_>, best: &Solution, near: &Isometry3<f64>) -> Op
     is_other.then(|| Solution::new(&minimum, seen.corners.len()))
 }
 
-/// Checks that the corners of view `view` are points of the target, are numbers and span a plane.
+/// Checks that the corners of view `view` are points of the target, are finite and span a plane.
 pub fn check_corners(corners: &[Corner], target: &TargetSpec, view: usize) -> Result<(), PoseError> {
     let grid = target.grid();
     if !(grid.square_m.is_finite() && grid.square_m > 0.0) {

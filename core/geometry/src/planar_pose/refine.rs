@@ -7,12 +7,12 @@ use crate::view_equations::{FreeParameters, PoseEquations, ViewInput};
 
 /// A step whose rotation \[rad\] and translation [part of the distance] are below this ends the descent: rounding.
 const CONVERGED: f64 = 1e-12;
-/// First damping relative to the diagonal, and what a step that was no good raises it to at least.
+/// First damping relative to the diagonal, and the least value to which a failed step raises it.
 const DAMPING: f64 = 1e-6;
 /// Past this damping a step is too small to matter.
 const LARGEST_DAMPING: f64 = 1e8;
 
-/// Where a descent ended.
+/// End of a descent.
 #[derive(Debug, Clone)]
 pub struct Minimum {
     /// `camera_from_target`.
@@ -24,10 +24,10 @@ pub struct Minimum {
 }
 
 /// Levenberg–Marquardt over `start * exp(delta)` on `Σ ‖W (project(camera_from_target * point) − px)‖²`, with lens and
-/// shape of the target as they are given, in at most so many steps.
+/// shape of the target as given, in at most `steps` steps.
 ///
-/// `None` when the start has a corner without image, which no later step would mend. Where the corners determine no pose
-/// the descent ends where they no longer tell a direction.
+/// `None` when the start has a corner without image, which no later step would correct. Where the corners do not
+/// determine a pose the descent ends where they no longer determine a direction.
 pub fn refine(seen: &ViewInput<'_>, start: &Isometry3<f64>, steps: usize) -> Option<Minimum> {
     let at = |pose: &Isometry3<f64>| {
         PoseEquations::new(seen, pose, FreeParameters::default()).ok().filter(|there| there.squared_px.is_finite())

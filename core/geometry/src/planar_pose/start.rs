@@ -1,4 +1,4 @@
-//! The two poses of a plane that go with its map to the image.
+//! The two poses of a plane that are consistent with its map to the image.
 
 use nalgebra::{
     Isometry3, Matrix2, Matrix2x3, Matrix3, Rotation3, SymmetricEigen, Translation3, UnitQuaternion, Vector2, Vector3,
@@ -9,13 +9,13 @@ use crate::camera::CameraError;
 use crate::targets::observation::Corner;
 use crate::view_equations::ViewInput;
 
-/// Smallest cosine to the optical axis of the rays that start a pose: the plane z = 1 has no room for more.
+/// Smallest cosine to the optical axis of the rays that start a pose: on the plane z = 1 they would be too far out.
 const MIN_RAY_Z: f64 = 0.05;
 
 /// A point of the target's plane z = 0, metres, and where its ray meets the plane z = 1 of the camera.
 pub type Pair = (Vector2<f64>, Vector2<f64>);
 
-/// The pair of a corner, the target taken for flat; `None` beyond 87° from the optical axis.
+/// The pair of a corner, the target taken as flat; `None` beyond 87° from the optical axis.
 ///
 /// # Errors
 /// [`CameraError::OutsideModel`] for a corner without ray.
@@ -27,7 +27,7 @@ pub fn pair(seen: &ViewInput<'_>, corner: &Corner) -> Result<Option<Pair>, Camer
 
 /// Both poses of a plane that the rays allow to first order in the size of the target: starts for
 /// [`super::refine::refine`]. The first fits better by the reprojection error on the plane z = 1. `None` where fewer than
-/// four pairs are given, or where they determine no map.
+/// four pairs are given, or where they do not determine a map.
 pub fn starts(pairs: &[Pair]) -> Option<[Isometry3<f64>; 2]> {
     both(pairs).map(|[a, b]| if misfit(pairs, &b) < misfit(pairs, &a) { [b, a] } else { [a, b] })
 }
@@ -46,19 +46,19 @@ fn misfit(pairs: &[Pair], pose: &Isometry3<f64>) -> f64 {
 /// the plane z = 0, its image on the plane z = 1) in the middle of the points.
 ///
 /// # Derivation
-/// Let the point `m` of the plane be imaged at `v` with the slope `J` (2×2), and let it lie at the depth `d`, that is, at
+/// Let the point `m` of the plane be imaged at `v` with the slope `J` (2×2), and let it be at the depth `d`, that is, at
 /// `d [v, 1]`. A motion of the point by `δ` moves it by `R₁₂ δ` in the camera, `R₁₂` being the first two columns of the
 /// rotation, and its image by `(1/d) [I | −v] R₁₂ δ`. So `[I | −v] R₁₂ = d J`: three equations too few for the rotation,
 /// since `[I | −v]` takes the line of sight to zero. In axes that are turned by `Q` such that z is the line of sight,
-/// `[I | −v] Q = [B | 0]`, and the upper two rows of `Qᵀ R₁₂` are `d A` with `A = B⁻¹ J`. What is left to find is the
+/// `[I | −v] Q = [B | 0]`, and the upper two rows of `Qᵀ R₁₂` are `d A` with `A = B⁻¹ J`. What remains to be found is the
 /// third row `c`, how fast the plane recedes, and `d`. The columns of a rotation are perpendicular and of length 1:
 ///
 /// `d² AᵀA + cᵀc = I`.
 ///
 /// `cᵀc` has rank one and no negative eigenvalue, so the larger eigenvalue `λ₁` of `AᵀA` gives the depth,
 /// `d² λ₁ = 1`, and `c` points along the eigenvector of the smaller one with the length `√(1 − λ₂/λ₁)`. Its sign is free:
-/// the plane may recede one way or the other, which differ in the second order only. These are the two poses; where
-/// `λ₁ = λ₂` the plane is perpendicular to the line of sight and they are one.
+/// the plane may recede one way or the other, which differ only in second order. These are the two poses; where `λ₁ = λ₂`
+/// the plane is perpendicular to the line of sight and they are one.
 ///
 /// # Reference
 /// Collins & Bartoli 2014, "Infinitesimal plane-based pose estimation", IJCV 109.

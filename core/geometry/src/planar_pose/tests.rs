@@ -60,7 +60,7 @@ fn a_fisheye_pose_uses_corners_beside_the_camera_too() {
         distortion: Distortion::Fisheye([-0.02, 0.004, -0.003, 0.0005]),
         ..Intrinsics::pinhole(640, 480, 120.0)
     };
-    // The board's last columns lie behind the plane of the camera.
+    // The board's last columns are behind the plane of the camera.
     let truth = looking_at(&GRID, &camera, 0.05, [0.9, 1.2, 0.3], Vector2::new(20.0, 0.0));
     let depths: Vec<f64> = (0..GRID.len()).map(|i| (truth * GRID.point(i)).z).collect();
     assert!(depths.iter().any(|z| *z < 0.0), "the scene does not test what it should");
@@ -205,7 +205,8 @@ proptest! {
     }
 }
 
-/// Pixels in the image mostly; on a coarse lattice, so that points fall together and on lines; and what is no pixel.
+/// Pixels in the image mostly; on a coarse lattice, so that points coincide or are on lines; and values that are not
+/// valid pixels.
 fn any_px() -> impl Strategy<Value = f64> {
     let special = vec![f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, 1e200, 1e-300, -1e9];
     prop_oneof![12 => 0.0..640.0f64, 6 => (0u8..6).prop_map(|i| f64::from(i) * 100.0), 1 => proptest::sample::select(special)]

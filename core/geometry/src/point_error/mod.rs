@@ -1,5 +1,4 @@
-//! How far off a point may be: its covariance by that of the hand-eye transform, and the length that 95 % of errors stay
-//! under.
+//! Error of a point: its covariance by that of the hand-eye transform, and the length that 95 % of errors stay below.
 
 mod radius;
 
@@ -9,14 +8,14 @@ use crate::se3::skew;
 
 pub use radius::{radius_95, radius_95_mixture, radius_95_t};
 
-/// Covariance in the camera frame of where `point` (camera coordinates, metres) is stated to be, given the covariance
+/// Covariance in the camera frame of the stated place of `point` (camera coordinates, metres), given the covariance
 /// `[t; r]` of the hand-eye transform (right perturbation).
 pub fn covariance(hand_eye: &Matrix6<f64>, point: &Point3<f64>) -> Matrix3<f64> {
     let by_pose = by_hand_eye(point);
     by_pose * hand_eye * by_pose.transpose()
 }
 
-/// How a `point` (camera coordinates, metres) moves with the hand-eye transform `[t; r]`, right perturbation.
+/// Jacobian of a `point` (camera coordinates, metres) by the hand-eye transform `[t; r]`, right perturbation.
 pub fn by_hand_eye(point: &Point3<f64>) -> SMatrix<f64, 3, 6> {
     let mut by_pose = SMatrix::<f64, 3, 6>::zeros();
     by_pose.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());

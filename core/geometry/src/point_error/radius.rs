@@ -1,12 +1,12 @@
-//! The length that 95 % of error vectors stay under.
+//! The length that 95 % of error vectors stay below.
 
 use nalgebra::{Matrix3, Vector3};
 use statrs::function::beta::{beta_reg, ln_beta};
 
-/// Share of the errors that stay under the radius.
+/// Share of the errors that stay below the radius.
 const PROBABILITY: f64 = 0.95;
 /// Nodes and weights of Gauss–Legendre quadrature on [0, 1] in the cosine to the longest axis. Eight of them with six
-/// azimuths keep the probability right to 3e-6 for every ratio of axes.
+/// azimuths keep the probability accurate to 3e-6 for every ratio of axes.
 const COSINES: [(f64, f64); 8] = [
     (0.019_855_071_751_231_884, 0.050_614_268_145_188_13),
     (0.101_666_761_293_186_63, 0.111_190_517_226_687_24),
@@ -19,30 +19,30 @@ const COSINES: [(f64, f64); 8] = [
 ];
 /// Midpoints of the azimuth in a quarter of a turn; the integrand is periodic, so few are enough.
 const AZIMUTHS: usize = 6;
-/// Newton steps at the most; four are usual, more than ten are needed below two degrees of freedom.
+/// Most Newton steps; four are usual, more than ten are needed below two degrees of freedom.
 const MAX_STEPS: usize = 100;
 /// Relative step that ends them. The next one would be of the order of its square, far below the error of the quadrature.
 const TOLERANCE: f64 = 1e-5;
 
-/// The length that a Gaussian error vector of this covariance stays under with a probability of 95 %.
+/// The length that a Gaussian error vector of this covariance stays below with a probability of 95 %.
 ///
-/// Zero for a zero matrix; not a number when the covariance is not finite. Exact up to quadrature (relative 1e-5).
+/// Zero for a zero matrix; NaN when the covariance is not finite. Exact up to quadrature (relative 1e-5).
 pub fn radius_95(covariance: &Matrix3<f64>) -> f64 {
     radius_95_t(covariance, f64::INFINITY)
 }
 
-/// The length that an error vector stays under with a probability of 95 % when its covariance was estimated with so
-/// many `degrees` of freedom (multivariate t); infinitely many are a Gaussian with known covariance.
+/// The length that an error vector stays below with a probability of 95 % when its covariance was estimated with
+/// `degrees` degrees of freedom (multivariate t); infinitely many are a Gaussian with known covariance.
 ///
 /// Along a direction `u` of the unit sphere the squared length is `(uᵀ C u) 3 F(3, degrees)`; the probability is the mean
 /// over all directions, found by quadrature in the principal axes and solved for the length by Newton's method. Beyond
-/// the first guess, the quantile of the longest axis alone, the probability is concave, so the steps grow towards the
-/// answer and never pass it.
+/// the first guess, the quantile of the longest axis alone, the probability is concave, so the steps approach the answer
+/// and never pass it.
 ///
-/// Zero for a zero matrix; not a number when the covariance is not finite; infinite when there is not a single degree of
-/// freedom to tell the size of the error by.
+/// Zero for a zero matrix; NaN when the covariance is not finite; infinite when there is not a single degree of freedom
+/// to determine the size of the error.
 pub fn radius_95_t(covariance: &Matrix3<f64>, degrees: f64) -> f64 {
-    // The eigenvalues of what is not a number would be taken for zeros.
+    // The eigenvalues of a matrix with NaN would be taken for zeros.
     if !covariance.iter().all(|c| c.is_finite()) {
         return f64::NAN;
     }
@@ -57,16 +57,16 @@ pub fn radius_95_t(covariance: &Matrix3<f64>, degrees: f64) -> f64 {
     radius_of(&scales(&(variances / largest)), &Length::new(degrees)) * largest.sqrt()
 }
 
-/// The length that an error vector stays under with a probability of 95 % when it is Gaussian with one of several
+/// The length that an error vector stays below with a probability of 95 % when it is Gaussian with one of several
 /// covariances, each with a weight; the weights sum to 1.
 ///
-/// Not a number when a covariance is not finite, zero where all are zero.
+/// NaN when a covariance is not finite, zero where all are zero.
 pub fn radius_95_mixture(covariances: &[(f64, Matrix3<f64>)]) -> f64 {
     if !covariances.iter().all(|(weight, c)| weight.is_finite() && c.iter().all(|c| c.is_finite())) {
         return f64::NAN;
     }
     let variances: Vec<(f64, Vector3<f64>)> = covariances.iter().map(|(weight, c)| (*weight, sorted(c))).collect();
-    // The smallest of the longest axes: the first guess must not lie beyond the answer.
+    // The smallest of the longest axes: the first guess must not be beyond the answer.
     let unit = variances.iter().map(|(_, v)| v[2]).filter(|v| *v > 0.0).fold(f64::INFINITY, f64::min);
     if !unit.is_finite() {
         return 0.0;
@@ -123,14 +123,14 @@ fn scales(variances: &Vector3<f64>) -> [(f64, f64); COSINES.len() * AZIMUTHS] {
     out
 }
 
-/// Distribution of three times an F variable with three and so many degrees of freedom.
+/// Distribution of three times an F variable with three and `degrees` degrees of freedom.
 struct Length {
     degrees: f64,
     ln_beta: f64,
 }
 
-/// Degrees of freedom from which on the normal law is closer than the quadrature: its relative error is about one over
-/// their number.
+/// Degrees of freedom from which on the normal distribution is closer than the quadrature: its relative error is about
+/// one over their number.
 const MANY: f64 = 1e6;
 
 impl Length {

@@ -1,4 +1,4 @@
-//! How a real target differs from its drawing: it sags, and its print may be a little larger or smaller.
+//! How a real target differs from its drawing: it bends, and its print may be a little larger or smaller.
 //!
 //! A point of the drawing at `(x, y, 0)` is really at `scale * (x, y, warp_x (1 − u²) + warp_y (1 − v²))`, where `u` and
 //! `v` run from −1 to 1 over the extent of the target along x and y. The two warps are the deflections of the middle
@@ -60,12 +60,12 @@ impl BoardPoints {
         self.drawn.len()
     }
 
-    /// Whether there is none.
+    /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.drawn.is_empty()
     }
 
-    /// Its points as they are drawn, in target axes, metres.
+    /// Its points as drawn, in target axes, metres.
     pub fn drawn(&self) -> &[Point3<f64>] {
         &self.drawn
     }
@@ -76,32 +76,32 @@ impl BoardPoints {
         Point3::new(x, y, 0.0)
     }
 
-    /// From its first to its last point along the longer side as drawn, metres.
+    /// Distance from its first to its last point along the longer side as drawn, metres.
     pub fn longer_side_m(&self) -> f64 {
         let [x, y] = [0, 1].map(|axis| 2.0 * middle_and_half(&self.drawn, axis).1);
         x.max(y)
     }
 
-    /// Where a point of a target of that shape really is, metres.
+    /// True place of a point of a target with this shape, metres.
     pub fn point(&self, index: usize, shape: &BoardShape) -> Point3<f64> {
         let [x, y] = self.sag[index];
         let bent = self.drawn[index].coords + Vector3::z() * (shape.warp_m[0] * x + shape.warp_m[1] * y);
         Point3::from(bent * shape.scale)
     }
 
-    /// All of them.
+    /// The true places of all points, metres.
     pub fn points(&self, shape: &BoardShape) -> Vec<Point3<f64>> {
         (0..self.len()).map(|i| self.point(i, shape)).collect()
     }
 
-    /// How a point moves along z with either warp, and how it moves with the scale.
+    /// Derivatives of a point: along z by either warp, and by the scale.
     pub(crate) fn derivatives(&self, index: usize, shape: &BoardShape) -> ([f64; 2], Vector3<f64>) {
         let by_warp = self.sag[index].map(|s| s * shape.scale);
         (by_warp, self.point(index, shape).coords / shape.scale)
     }
 }
 
-/// Middle and half the length of what points cover along an axis.
+/// Middle and half length of the extent of points along an axis.
 fn middle_and_half(points: &[Point3<f64>], axis: usize) -> (f64, f64) {
     let range = (f64::INFINITY, f64::NEG_INFINITY);
     let (low, high) = points.iter().map(|p| p[axis]).fold(range, |(low, high), v| (low.min(v), high.max(v)));

@@ -2,11 +2,13 @@
 
 use nalgebra::{Cholesky, DMatrix};
 
-/// The part of the mean variance that every corner has for itself, whatever its detector says. A tenth costs one part in a hundred
-/// where the statement is true and corners are independent, and keeps a single corner from counting more than ten typical ones.
+/// The part of the mean variance that every corner has independently, whatever its detector states. A tenth costs one part in a
+/// hundred where the statement is true and corners are independent, and keeps a single corner from counting more than ten typical
+/// ones.
 pub const COMMON: f64 = 0.1;
 
-/// Covariance of all corners of an image, with what they share: where corners are the ends of edges, neighbours err alike.
+/// Covariance of all corners of an image, with what they share: where corners are the ends of edges, the errors of
+/// neighbours are correlated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CornerCovariance {
     /// `W` of the covariance `C` with the mean variance `v` per number, lower triangular: `WᵀW = ((1 − c) C / v + c 1)⁻¹` with
@@ -16,7 +18,8 @@ pub struct CornerCovariance {
 }
 
 impl CornerCovariance {
-    /// From the covariance of x and y of each corner in turn, squared pixels; `None` where it is not one.
+    /// The whitener of a covariance of x and y of each corner in turn, squared pixels; `None` where that is not a valid
+    /// covariance.
     pub fn new(px2: &DMatrix<f64>) -> Option<Self> {
         let numbers = px2.nrows();
         let mean_px2 = px2.trace() / numbers.max(1) as f64;
@@ -37,7 +40,7 @@ impl CornerCovariance {
         self.whitener.nrows() / 2
     }
 
-    /// Whether it is of no corners.
+    /// Whether it has no corners.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -53,22 +56,22 @@ impl CornerCovariance {
         Some(px2 * (self.mean_px2 / (1.0 - COMMON)))
     }
 
-    /// That of some of the corners, in the order of their numbers here.
+    /// The covariance of some of the corners, in the order of their numbers here.
     pub(crate) fn of(&self, corners: &[usize]) -> Option<Self> {
         let kept: Vec<usize> = corners.iter().flat_map(|i| [2 * i, 2 * i + 1]).collect();
         let px2 = self.px2()?;
         Self::new(&px2.select_rows(&kept).select_columns(&kept))
     }
 
-    /// The residuals of all corners, x and y of each in turn, one column or more, as residuals of independent corners with the
-    /// variance `unit_px2`.
+    /// The residuals of all corners, x and y of each in turn, one column or more, converted to residuals of independent
+    /// corners with the variance `unit_px2`.
     pub(crate) fn whitened(&self, residuals: &DMatrix<f64>, unit_px2: f64) -> DMatrix<f64> {
         &self.whitener * residuals * (unit_px2 / self.mean_px2).sqrt()
     }
 }
 
-/// The inverse of a lower triangular matrix; `None` where it has none. Of the identity as the right side half is zero, which a
-/// solution by columns of whole length goes through all the same.
+/// The inverse of a lower triangular matrix; `None` where it has none. Half of the right side, the identity, is zero, which a
+/// solution by columns of full length would process all the same.
 pub(crate) fn lower_inverse(lower: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let size = lower.nrows();
     let mut inverse = DMatrix::identity(size, size);
@@ -100,7 +103,7 @@ mod tests {
         let px2 = neighbours();
         let all = CornerCovariance::new(&px2).expect("a covariance");
         let identity = DMatrix::identity(8, 8);
-        // W C Wᵀ, times a unit of four hundredths, is the identity but for a tenth of it.
+        // W C Wᵀ, times a unit of four hundredths, is the identity except for a tenth of it.
         let whitener = all.whitened(&identity, 0.04);
         let common = &px2 * (1.0 - COMMON) + &identity * (0.04 * COMMON);
         let white = &whitener * common * whitener.transpose();

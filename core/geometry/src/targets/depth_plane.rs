@@ -7,9 +7,9 @@
 //! z = t_z + r₃₁ x + r₃₂ y
 //! ```
 //!
-//! where `t` and `R` are the target's pose in the camera. Its two slopes are the third row of `R`: they tell the tilt, which corners
-//! tell worst. The depth of a corner is that of a plane through the inverse depths of the pixels around it, because inverse depth is
-//! linear in the pixel.
+//! where `t` and `R` are the target's pose in the camera. Its two slopes are the third row of `R`: they determine the tilt, which
+//! corners determine worst. The depth of a corner is that of a plane through the inverse depths of the pixels around it, because
+//! inverse depth is linear in the pixel.
 
 use nalgebra::{Matrix2, Matrix3, Point3, Vector2, Vector3};
 
@@ -20,13 +20,14 @@ use crate::targets::observation::Corner;
 
 /// Where nothing reflects a sensor reports its far plane, which no target is at, so that it need not be known.
 const FAR_M: f32 = f32::INFINITY;
-/// Pixels around a corner go this part of the way to the nearest other one, so that no depth is counted for many corners.
+/// Pixels around a corner extend over this part of the distance to the nearest other one, so that no depth counts for
+/// many corners.
 const AROUND: f64 = 0.4;
-/// And so many pixels at the least and the most.
+/// And the least and the largest extent, pixels.
 const RADIUS_PX: (f64, f64) = (1.0, 8.0);
 /// Part of the pixels around a corner that has to be measured.
 const LEAST_AROUND: f64 = 0.5;
-/// Least part of the corners that has to have a depth on one plane: with fewer something else may be taken for the target.
+/// Least part of the corners that has to have a depth on one plane: with fewer another object may be taken for the target.
 const LEAST: f64 = 0.5;
 /// And the least number: three determine a plane.
 const LEAST_CORNERS: usize = 6;
@@ -42,7 +43,7 @@ pub struct DepthPlane {
     pub place_m: Vector2<f64>,
     /// The depth there, metres, and by how much it grows along the target's x and y, metres per metre.
     pub depth: Vector3<f64>,
-    /// How well these three are known where the depths all err by as much as one of them: the mean of `g gᵀ` over the depths with
+    /// Information on these three, as if all depths together had the variance of one: the mean of `g gᵀ` over the depths with
     /// `g = (1, x, y)` from the mean place. The inverse, times the variance of a depth, is a covariance.
     pub information: Matrix3<f64>,
     /// Scatter of single depths about the plane, one standard deviation, metres.
@@ -51,26 +52,27 @@ pub struct DepthPlane {
     pub fill: f64,
 }
 
-/// Depths off by more than this factor are in another unit, or of another image: the worst depth cameras are off by some percent.
+/// Depths off by more than this factor are in another unit, or from another image: the worst depth cameras are off by some
+/// percent.
 const GROSS: f64 = 1.2;
 
-/// Whether depths that are so many times those expected are in metres and of the same image.
+/// Whether depths that are this many times those expected are in metres and from the same image.
 pub fn are_of_right_size(ratio: f64) -> bool {
     (1.0 / GROSS..=GROSS).contains(&ratio)
 }
 
-/// A depth of the target.
+/// The depth at a corner of the target.
 #[derive(Clone, Copy)]
 struct Sample {
     place: Vector2<f64>,
     depth_m: f64,
-    /// Of the single depths around it about theirs.
+    /// Variance of the single depths around it about their plane.
     variance_m2: f64,
 }
 
 impl DepthPlane {
-    /// Of the corners of an image of that width and height, by the depth image registered to it. `None` where that is of another
-    /// size, and where less than half of the corners, or fewer than six, have depths of one plane.
+    /// The plane at the corners of an image with this width and height, by the depth image registered to it. `None` where that
+    /// has another size, and where less than half of the corners, or fewer than six, have depths of one plane.
     pub fn new(depth: &DepthImage, image_size: (u32, u32), corners: &[Corner], target: &TargetSpec) -> Option<Self> {
         if (depth.width, depth.height) != image_size {
             return None;
@@ -97,10 +99,11 @@ impl DepthPlane {
         self.depth.dot(&Vector3::new(1.0, aside.x, aside.y))
     }
 
-    /// The same where the target is counted from another corner, so many of its [quarter turns](TargetSpec::quarter_turns) away.
+    /// The same where the target is numbered from another corner, this many of its [quarter turns](TargetSpec::quarter_turns)
+    /// away.
     #[must_use]
     pub fn renumbered(&self, target: &TargetSpec, quarter_turns: usize) -> Self {
-        // A point of the target as it was counted is `turn` times that as it is counted now, about the middle of the target.
+        // A point of the target in the old numbering is `turn` times that in the new one, about the middle of the target.
         let turn = match quarter_turns % 4 {
             0 => Matrix2::identity(),
             1 => Matrix2::new(0.0, -1.0, 1.0, 0.0),
@@ -145,7 +148,7 @@ fn radius_px(corner: &Corner, corners: &[Corner]) -> f64 {
     (AROUND * nearest).clamp(RADIUS_PX.0, RADIUS_PX.1)
 }
 
-/// What the pixels around a corner say.
+/// The depths of the pixels around a corner.
 struct Around {
     /// The depth of the corner, metres, and the variance of the single ones, square metres.
     depth: Option<(f64, f64)>,
@@ -192,7 +195,7 @@ fn depth_around(depth: &DepthImage, px: &Vector2<f64>, radius: f64) -> Around {
     Around { depth, measured, looked_at }
 }
 
-/// The plane through the depths that are on one, with those left out that are not.
+/// The plane through the depths, without those that are not on it.
 fn on_one_plane(mut samples: Vec<Sample>, least: usize) -> Option<DepthPlane> {
     if samples.len() < least {
         return None;
@@ -222,7 +225,7 @@ fn on_one_plane(mut samples: Vec<Sample>, least: usize) -> Option<DepthPlane> {
     Some(plane)
 }
 
-/// Triples of so many numbers, spread evenly (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences").
+/// Triples of `count` numbers, spread evenly (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences").
 fn triples(count: usize) -> impl Iterator<Item = [usize; 3]> {
     /// Powers of the root of x⁴ = x + 1.
     const STEPS: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_3, 0.549_700_477_901_970_4];

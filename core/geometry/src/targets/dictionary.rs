@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-/// A family of square black markers: which codes there are, and of how many bits.
+/// A family of square black markers: its codes and their number of bits.
 ///
 /// They are the predefined dictionaries of OpenCV's `aruco`, among them four families of `AprilTag`. The codes
 /// themselves are in OpenCV.
@@ -54,7 +54,7 @@ impl Dictionary {
         &ALL[usize::from(self.0)]
     }
 
-    /// As files call it.
+    /// Its name in files.
     pub fn name(self) -> &'static str {
         self.entry().0
     }
@@ -64,7 +64,7 @@ impl Dictionary {
         self.entry().1
     }
 
-    /// How many markers it has; they are numbered from 0.
+    /// Number of markers; they are numbered from 0.
     pub fn markers(self) -> usize {
         self.entry().2
     }
@@ -80,7 +80,7 @@ impl Dictionary {
     }
 }
 
-/// A family that is not known.
+/// The name of a family that is not known.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 #[error("marker family {0:?} is not known: it is one of {list}", list = names())]
 pub struct UnknownDictionary(pub String);
@@ -92,7 +92,7 @@ fn names() -> String {
 impl FromStr for Dictionary {
     type Err = UnknownDictionary;
 
-    /// `4x4_50`, and what others call the same: `DICT_4X4_50`, `36h11`, `tag36h11`, `t36h11`, `DICT_APRILTAG_36h11`.
+    /// `4x4_50`, and other names for the same: `DICT_4X4_50`, `36h11`, `tag36h11`, `t36h11`, `DICT_APRILTAG_36h11`.
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let lower = text.to_ascii_lowercase();
         let name = lower.strip_prefix("dict_").unwrap_or(&lower);

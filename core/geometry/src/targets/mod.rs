@@ -21,18 +21,18 @@ pub use tags::{AprilGrid, AprilTag, Charuco, IdOrder, Layout};
 /// A printed target. Its points lie in the plane z = 0 of the target frame (x along columns, y along rows, z into
 /// the board), and are numbered row by row: point `row * columns + column` of [`TargetSpec::grid`].
 ///
-/// [`TargetSpec::points`] is the one truth about the numbering. Not every lattice of points is evenly spaced: where a
-/// point is, only [`TargetSpec::point`] says.
+/// [`TargetSpec::points`] defines the numbering. Not every lattice of points is evenly spaced: only
+/// [`TargetSpec::point`] gives the place of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum TargetSpec {
     /// A chessboard, described by its inner corners. The square between the corners (0, 0), (1, 0), (0, 1) and (1, 1)
-    /// is dark; this is what tells the two ends of a board apart.
+    /// is dark; this distinguishes the two ends of a board.
     Chessboard(Grid),
     /// A symmetric grid of dots, described by their centres. A larger dot, where there is one, is the origin.
     Circles(Grid),
-    /// A grid of dots whose odd rows are shifted by half the distance of the dots in a row, as OpenCV has it: dot
-    /// (column, row) is at `((2 column + row mod 2) square_m, row square_m)`.
+    /// A grid of dots whose odd rows are shifted by half the distance of the dots in a row, as in OpenCV: dot (column,
+    /// row) is at `((2 column + row mod 2) square_m, row square_m)`.
     AsymmetricCircles(Grid),
     /// A chessboard with markers in its light squares, described by its inner corners.
     Charuco(Charuco),
@@ -61,7 +61,7 @@ impl Grid {
         self.columns * self.rows
     }
 
-    /// Whether there is no point at all.
+    /// Whether there are no points.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -73,15 +73,15 @@ impl Grid {
     }
 }
 
-/// A number of a target that cannot be.
+/// A number of a target that is not valid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[error("{key} = {value} is not usable: it must be {want}")]
 pub struct BadTarget {
-    /// Which, as a data set calls it.
+    /// Its name in a data set.
     pub key: &'static str,
-    /// The number as it was stated.
+    /// The number as stated.
     pub value: String,
-    /// What it may be.
+    /// The values allowed.
     pub want: &'static str,
 }
 
@@ -89,12 +89,12 @@ pub struct BadTarget {
 const MOST_POINTS: usize = 1000;
 
 impl TargetSpec {
-    /// The lattice of its points: how many there are along x and y. Point `row * columns + column` is at that place of
-    /// the lattice, in the drawing as in a table of corners.
+    /// The lattice of its points: their numbers along x and y. Point `row * columns + column` is at that place of the
+    /// lattice, both in the drawing and in a table of corners.
     ///
     /// The lattice of a chessboard, a `ChArUco` board, a symmetric grid of dots and a single tag is evenly spaced by
-    /// `square_m`. That of tags is not, nor are rows of asymmetric dots in line: there `square_m` is a typical distance,
-    /// good for the length of a drawn arrow.
+    /// `square_m`. That of tags is not, nor are the rows of asymmetric dots aligned: there `square_m` is a typical
+    /// distance, good for the length of a drawn arrow.
     pub fn grid(&self) -> Grid {
         match self {
             Self::Chessboard(grid) | Self::Circles(grid) | Self::AsymmetricCircles(grid) => *grid,
@@ -109,7 +109,7 @@ impl TargetSpec {
         self.grid().len()
     }
 
-    /// Whether there is no point at all.
+    /// Whether there are no points.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -133,13 +133,13 @@ impl TargetSpec {
         (0..self.len()).map(|i| self.point(i)).collect()
     }
 
-    /// The corner of the points' extent that lies opposite to the origin, metres.
+    /// The corner of the points' extent opposite to the origin, metres.
     pub fn extent(&self) -> Vector2<f64> {
         let grid = self.grid();
         let Some(last) = grid.len().checked_sub(1) else { return Vector2::zeros() };
         let far = self.point(last).coords.xy();
         match self {
-            // The shifted rows reach furthest.
+            // The shifted rows extend furthest.
             Self::AsymmetricCircles(grid) if grid.rows > 1 => {
                 Vector2::new((2 * grid.columns - 1) as f64 * grid.square_m, far.y)
             }
@@ -153,7 +153,7 @@ impl TargetSpec {
         Point3::new(half.x, half.y, 0.0)
     }
 
-    /// Places all over the extent of its points, in its plane, on a lattice of cells of even size.
+    /// Places all over the extent of its points, in its plane, on a lattice of cells of equal size.
     pub fn places_all_over(&self) -> Vec<Point3<f64>> {
         const ALONG: [usize; 2] = [48, 32];
         let extent = self.extent();
@@ -164,16 +164,17 @@ impl TargetSpec {
         (0..rows).flat_map(|row| (0..columns).map(move |column| place(row, column))).collect()
     }
 
-    /// Whether the printed pattern looks the same after a turn, so that no detector can tell its ends apart.
+    /// Whether the printed pattern looks the same after a turn, so that no detector can distinguish its ends.
     pub fn is_symmetric(&self) -> bool {
         !self.quarter_turns().is_empty()
     }
 
-    /// After how many quarter turns about its middle the printed pattern looks the same.
+    /// Numbers of quarter turns about its middle after which the printed pattern looks the same.
     ///
     /// A chessboard does after half a turn when the sum of its inner corners per row and column is even (9×7), and does not when it
-    /// is odd (9×6, 10×7); one that has as many rows as columns, an even number (8×8), after a quarter, too. A plain grid of dots does after
-    /// half a turn, a square one after a quarter; a shifted one after half a turn when its rows are even in number. Markers never do.
+    /// is odd (9×6, 10×7); one that has as many rows as columns, an even number (8×8), after a quarter, too. A plain grid of dots
+    /// does after half a turn, a square one after a quarter; a shifted one after half a turn when its rows are even in number.
+    /// Markers never do.
     pub fn quarter_turns(&self) -> &'static [usize] {
         let half: &[usize] = &[2];
         let every: &[usize] = &[1, 2, 3];
@@ -191,7 +192,8 @@ impl TargetSpec {
         }
     }
 
-    /// The number that a point has when the target is counted from another corner, so many of its [`Self::quarter_turns`] away.
+    /// The number that a point has when the target is numbered from another corner, this many of its [`Self::quarter_turns`]
+    /// away.
     pub fn renumbered(&self, index: usize, quarter_turns: usize) -> usize {
         let Grid { columns, rows, .. } = self.grid();
         let (column, row) = (index % columns, index / columns);
@@ -203,7 +205,7 @@ impl TargetSpec {
         }
     }
 
-    /// Checks what the types do not say.
+    /// Checks what the types do not ensure.
     ///
     /// # Errors
     /// [`BadTarget`] with the first number that is out of range.
@@ -221,7 +223,7 @@ impl TargetSpec {
         }
     }
 
-    /// What a data set calls its kind.
+    /// Name of its kind in a data set.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Chessboard(_) => "chessboard",
@@ -249,7 +251,7 @@ fn length(key: &'static str, value: f64) -> Result<(), BadTarget> {
 }
 
 impl TargetSpec {
-    /// What it is, with its sizes.
+    /// Description of the target, with its sizes.
     pub fn text(&self) -> Text {
         let Grid { columns, rows, square_m } = self.grid();
         let reported = match self {
@@ -270,7 +272,7 @@ impl fmt::Display for TargetSpec {
     }
 }
 
-/// Millimetres without the digits that come from counting in twos.
+/// Millimetres without the digits due to binary rounding.
 fn mm(metres: f64) -> f64 {
     (metres * 1e9).round() / 1e6
 }

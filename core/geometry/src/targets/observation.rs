@@ -1,4 +1,4 @@
-//! What a solver is given: corners in an image and the pose that the robot reported for it.
+//! Input of a solver: corners in an image and the pose that the robot reported for it.
 
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
@@ -15,22 +15,22 @@ use crate::targets::depth_plane::DepthPlane;
 pub struct Corner {
     /// Which point of the target: index into [`crate::targets::TargetSpec::points`].
     pub index: usize,
-    /// Where: column and row in pixels, (0, 0) at the centre of the top-left pixel.
+    /// Its place: column and row in pixels, (0, 0) at the centre of the top-left pixel.
     pub px: Vector2<f64>,
-    /// Covariance of `px` as the detector states it, squared pixels. Only its size against those of the other corners
-    /// counts for a solver, which finds the level itself. `None` where nothing is stated.
+    /// Covariance of `px` as the detector states it, squared pixels. Only its size relative to those of the other
+    /// corners matters for a solver, which estimates the level itself. `None` where nothing is stated.
     pub covariance_px2: Option<Matrix2<f64>>,
 }
 
 impl Corner {
-    /// A corner whose detector says nothing about its precision.
+    /// A corner whose detector states no precision.
     pub fn new(index: usize, px: Vector2<f64>) -> Self {
         Self { index, px, covariance_px2: None }
     }
 }
 
-/// The corners of one image, in any order, which [`renumber`] alone may change: it is that of their covariance. Copies share them until
-/// one is changed: what is observed, judged and kept for a fit are the same corners, which for many views are the most of all memory.
+/// The corners of one image, in any order, which only [`renumber`] may change: it is that of their covariance. Copies share them
+/// until one is changed: the corners observed, judged and kept for a fit are the same, and for many views take most of the memory.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Corners {
     all: Arc<Vec<Corner>>,
@@ -38,19 +38,19 @@ pub struct Corners {
 }
 
 impl Corners {
-    /// Corners with the covariance of all of them, in their order; where it is `None`, or of another number of corners, they err
-    /// independently.
+    /// Corners with the covariance of all of them, in their order; where it is `None`, or for another number of corners, their
+    /// errors are independent.
     pub fn together(corners: Vec<Corner>, covariance: Option<CornerCovariance>) -> Self {
         let together = covariance.filter(|it| it.len() == corners.len()).map(Arc::new);
         Self { all: Arc::new(corners), together }
     }
 
-    /// The covariance of all corners, in their order; `None` where they err independently.
+    /// The covariance of all corners, in their order; `None` where their errors are independent.
     pub fn covariance(&self) -> Option<&Arc<CornerCovariance>> {
         self.together.as_ref()
     }
 
-    /// Keeps those that a condition is true of.
+    /// Keeps those for which a condition is true.
     pub fn retain(&mut self, mut keep: impl FnMut(&Corner) -> bool) {
         let kept: Vec<usize> = (0..self.len()).filter(|&i| keep(&self[i])).collect();
         if kept.len() < self.len() {
@@ -58,7 +58,7 @@ impl Corners {
         }
     }
 
-    /// Numbers them again; they are then sorted by number.
+    /// Renumbers them; they are then sorted by number.
     fn renumber(&mut self, number: impl Fn(usize) -> usize) {
         for corner in self.iter_mut() {
             corner.index = number(corner.index);
@@ -68,7 +68,7 @@ impl Corners {
         self.take(&order);
     }
 
-    /// Those at these places, in this order.
+    /// Keeps those at these places, in this order.
     fn take(&mut self, places: &[usize]) {
         *self = Self {
             all: Arc::new(places.iter().map(|&i| self.all[i]).collect()),
@@ -153,16 +153,16 @@ impl View {
     }
 }
 
-/// How the tip turns with a joint, whose z axis it turns about: the twist `[t; r]` per radian with which it perturbs
-/// `base_from_tip` on the right, metres and radians.
+/// Derivative of the tip pose by a joint that turns about its z axis: the twist `[t; r]` per radian with which it
+/// perturbs `base_from_tip` on the right, metres and radians.
 pub fn tip_by_joint(tip_from_joint: &Isometry3<f64>) -> Vector6<f64> {
     let turn = tip_from_joint.rotation * Vector3::z();
     let shift = tip_from_joint.translation.vector.cross(&turn);
     Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
 }
 
-/// Numbers what an image shows of a target from another corner, so many of its [quarter turns](TargetSpec::quarter_turns) away; the
-/// corners are then sorted by number.
+/// Numbers what an image shows of a target from another corner, this many of its [quarter turns](TargetSpec::quarter_turns) away;
+/// the corners are then sorted by number.
 pub fn renumber(corners: &mut Corners, depth: &mut Option<DepthPlane>, target: &TargetSpec, quarter_turns: usize) {
     corners.renumber(|index| target.renumbered(index, quarter_turns));
     *depth = depth.map(|plane| plane.renumbered(target, quarter_turns));
@@ -184,7 +184,7 @@ mod tests {
         assert_eq!(second.iter().map(|corner| corner.px.x).collect::<Vec<_>>(), [7.0, 1.0]);
     }
 
-    /// Whatever is left out and however corners are numbered, each keeps what it shares with the others.
+    /// Whatever is left out and however corners are numbered, each keeps its covariance with the others.
     #[test]
     fn the_covariance_of_all_corners_follows_them() {
         let variance = |i: usize| 0.01 * (1.0 + i as f64);

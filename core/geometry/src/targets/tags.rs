@@ -23,7 +23,7 @@ impl Layout {
     /// Both, the usual one first.
     pub const BOTH: [Self; 2] = [Self::New, Self::Legacy];
 
-    /// As files call it.
+    /// Its name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::New => "new",
@@ -45,7 +45,7 @@ pub struct Charuco {
     pub marker_m: f64,
     /// Family of the markers.
     pub dictionary: Dictionary,
-    /// Which squares have the markers; told apart from each image where it is not stated.
+    /// Which squares have the markers; determined from each image where it is not stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub layout: Option<Layout>,
 }
@@ -56,7 +56,7 @@ impl Charuco {
         Grid { columns: self.columns, rows: self.rows, square_m: self.square_m }
     }
 
-    /// Whether both layouts draw the same board.
+    /// Whether both layouts give the same board.
     pub fn layouts_are_alike(&self) -> bool {
         self.rows.is_multiple_of(2)
     }
@@ -116,7 +116,7 @@ impl Charuco {
     }
 }
 
-/// Where the numbers of tags begin.
+/// Where the numbering of tags begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IdOrder {
@@ -128,7 +128,7 @@ pub enum IdOrder {
 }
 
 impl IdOrder {
-    /// As files call it.
+    /// Its name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::BottomUp => "bottom_up",
@@ -157,7 +157,8 @@ pub struct AprilGrid {
     pub first_id: usize,
     /// Family of the tags.
     pub family: Dictionary,
-    /// Width of the black border in bits: 2 on Kalibr's boards, 1 elsewhere. Both are looked for where it is not stated.
+    /// Width of the black border in bits: 2 on Kalibr's boards, 1 elsewhere. Both are searched for where it is not
+    /// stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub border_bits: Option<usize>,
     /// Which tag is the first.
@@ -173,7 +174,7 @@ impl AprilGrid {
         Grid { columns: 2 * self.columns, rows: 2 * self.rows, square_m }
     }
 
-    /// From tag to tag in metres.
+    /// Distance from tag to tag in metres.
     pub fn pitch_m(&self) -> f64 {
         self.tag_m + self.spacing_m
     }
@@ -262,7 +263,7 @@ pub struct AprilTag {
     pub tag_m: f64,
     /// Its number in the family.
     pub id: usize,
-    /// The dictionary that the tag is of.
+    /// The family of the tag.
     pub family: Dictionary,
     /// Width of the black border in bits, 1 where it is not stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -270,7 +271,7 @@ pub struct AprilTag {
 }
 
 impl AprilTag {
-    /// The board that has only this tag.
+    /// The board with only this tag.
     pub fn alone(&self) -> AprilGrid {
         AprilGrid {
             columns: 1,

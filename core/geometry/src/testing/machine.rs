@@ -1,24 +1,24 @@
-//! What tests need of the machine that may not be there, and how they say that they skip.
+//! Requirements of tests that a machine may not have, and how tests report that they skip.
 //!
-//! A test that cannot run says so in one line past the test runner, which swallows what passing tests print, and adds a
-//! line to the file that `$HANDEYE_SKIPPED` names, from which `./test` makes its summary. Where `$HANDEYE_REQUIRE` names
-//! what is missing, as it does in the gate, the test fails instead.
+//! A test that cannot run reports it in one line past the test runner, which hides the output of passing tests, and adds
+//! a line to the file named by `$HANDEYE_SKIPPED`, from which `./test` makes its summary. Where `$HANDEYE_REQUIRE` names
+//! what is missing, as in the gate, the test fails instead.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Something of the machine that a test cannot do without.
+/// A requirement of a test on the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Need {
     /// The reference data sets.
     Data,
     /// Python with the packages of `tests/python/requirements.txt`, as `./test` sets it up.
     Python,
-    /// A screen and a mouse without a person: Xvfb, xdotool and ImageMagick.
+    /// A virtual screen and mouse: Xvfb, xdotool and ImageMagick.
     Xvfb,
     /// A web browser.
     Chromium,
-    /// A Vulkan driver, of the processor too, for images of the window.
+    /// A Vulkan driver, also one in software, for images of the window.
     Vulkan,
 }
 
@@ -35,7 +35,7 @@ impl Need {
     }
 }
 
-/// Says that the running test skips.
+/// Reports that the running test skips.
 ///
 /// # Panics
 /// When `$HANDEYE_REQUIRE` (names with commas between) names the need: then its absence is a failure.
@@ -57,11 +57,11 @@ pub fn skip(need: Need, why: &str) {
     written.expect("a line about a skipped test can be written");
 }
 
-/// Folder of the reference data sets: `$HANDEYE_DATA`, else `../shared/data` beside the workspace. `None` when there is
-/// none; then the running test has said that it skips.
+/// Folder of the reference data sets: `$HANDEYE_DATA`, else `../shared/data` next to the workspace. `None` when there
+/// is none; then the running test has reported that it skips.
 ///
 /// # Panics
-/// When there is none and `$HANDEYE_REQUIRE` asks for it.
+/// When there is none and `$HANDEYE_REQUIRE` requires it.
 pub fn data_folder() -> Option<PathBuf> {
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let folder = std::env::var_os("HANDEYE_DATA").map_or_else(beside, PathBuf::from);
@@ -72,10 +72,11 @@ pub fn data_folder() -> Option<PathBuf> {
     None
 }
 
-/// Python as `./test` sets it up (`$HANDEYE_PYTHON`). `None` elsewhere; then the running test has said that it skips.
+/// Python as `./test` sets it up (`$HANDEYE_PYTHON`). `None` elsewhere; then the running test has reported that it
+/// skips.
 ///
 /// # Panics
-/// When it is not set and `$HANDEYE_REQUIRE` asks for it.
+/// When it is not set and `$HANDEYE_REQUIRE` requires it.
 pub fn python() -> Option<PathBuf> {
     let python = std::env::var_os("HANDEYE_PYTHON").map(PathBuf::from);
     if python.is_none() {
@@ -84,10 +85,10 @@ pub fn python() -> Option<PathBuf> {
     python
 }
 
-/// Whether all these programs are on the path; where one is not, the running test has said that it skips.
+/// Whether all these programs are on the path; where one is not, the running test has reported that it skips.
 ///
 /// # Panics
-/// When one is missing and `$HANDEYE_REQUIRE` asks for them.
+/// When one is missing and `$HANDEYE_REQUIRE` requires them.
 pub fn programs(need: Need, names: &[&str]) -> bool {
     let path = std::env::var_os("PATH").unwrap_or_default();
     let is_there = |name: &&str| std::env::split_paths(&path).any(|folder| folder.join(name).is_file());

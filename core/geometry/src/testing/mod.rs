@@ -1,5 +1,5 @@
-//! What tests of all crates share: what a machine must have for a test, the board of the reference cell, and places to look
-//! at it from. Feature `testing`.
+//! What tests of all crates share: what a machine must have for a test, the board of the reference cell, and camera places
+//! to view it from. Feature `testing`.
 
 mod machine;
 mod views;

@@ -1,4 +1,4 @@
-//! What the depths of a target say of its pose.
+//! The information of the depths of a target on its pose.
 
 use nalgebra::{Isometry3, Matrix3, Matrix3x6, Point3, Vector3};
 
@@ -7,31 +7,32 @@ use crate::camera::Intrinsics;
 use crate::targets::bent::BoardShape;
 use crate::targets::depth_plane::DepthPlane;
 
-/// How a depth camera errs: what it measures of a point `(x, y, z)` of the camera's frame is
+/// Errors of a depth camera: its depth of a point `(x, y, z)` in the camera's frame is
 /// `z + offset + scale z + slope g + tilt_x y − tilt_y x`, where `g` is by how much the depth changes from one pixel to the next,
-/// along the row or the column, whichever is more (OpenGL 4.6, §14.6.5, has polygon offsets so).
+/// along the row or the column, whichever is more (as polygon offsets in OpenGL 4.6, §14.6.5).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DepthBias {
     /// Added to every depth, metres.
     pub offset_m: f64,
-    /// Part of the depth that is added to it.
+    /// Fraction of the depth that is added to it.
     pub scale: f64,
     /// What is added to the depth of a slanted surface, in pixels' worth of its slope.
     pub slope_px: f64,
-    /// How far what is seen is turned by depth, about the camera's x and y, radians.
+    /// Rotation of the scene by the depths about the camera's x and y, radians.
     pub tilt_rad: [f64; 2],
 }
 
 impl DepthBias {
-    /// Number of them.
+    /// Number of errors.
     pub const COUNT: usize = 5;
 
-    /// Of offset, scale, slope and both tilts, in the order of the columns: metres, a part, pixels, radians.
+    /// The bias with offset, scale, slope and both tilts, in the order of the columns: metres, a fraction, pixels,
+    /// radians.
     pub fn new([offset_m, scale, slope_px, tilt_x, tilt_y]: [f64; Self::COUNT]) -> Self {
         Self { offset_m, scale, slope_px, tilt_rad: [tilt_x, tilt_y] }
     }
 
-    /// The same order.
+    /// The values in the same order.
     pub fn values(&self) -> [f64; Self::COUNT] {
         let [tilt_x, tilt_y] = self.tilt_rad;
         [self.offset_m, self.scale, self.slope_px, tilt_x, tilt_y]
@@ -41,16 +42,16 @@ impl DepthBias {
 /// The plane of a target by its depths.
 #[derive(Debug, Clone, Copy)]
 pub struct MeasuredDepths<'a> {
-    /// As measured.
+    /// The plane as measured.
     pub plane: &'a DepthPlane,
-    /// Errors of the depth camera, as estimated.
+    /// Estimated errors of the depth camera.
     pub bias: &'a DepthBias,
-    /// Pixels of a corner's error that a metre of the plane's counts as.
+    /// Pixels of corner error that count as much as a metre of the plane's error.
     pub px_per_m: f64,
 }
 
-/// Depths of a target's plane that a pose predicts, as in [`DepthPlane::depth`], and how they turn with pose, size of the target
-/// and bias.
+/// Depths of a target's plane that a pose predicts, as in [`DepthPlane::depth`], and their derivatives by pose, size of the
+/// target and bias.
 pub struct PredictedDepths {
     /// As [`DepthPlane::depth`].
     pub depth: Vector3<f64>,
@@ -61,7 +62,7 @@ pub struct PredictedDepths {
 }
 
 impl PredictedDepths {
-    /// The target counts as flat: a bend moves its mean depth by much less than an offset, which is free, takes up.
+    /// The target counts as flat: a bend moves its mean depth by much less than what the free offset absorbs.
     pub fn new(
         intrinsics: &Intrinsics,
         shape: &BoardShape,
@@ -74,8 +75,8 @@ impl PredictedDepths {
         let size = shape.scale;
         let place = Point3::new(plane.place_m.x * size, plane.place_m.y * size, 0.0);
         let there = camera_from_target * place;
-        // From pixel to pixel: z² times the slope of the inverse depth. How that turns with the pose is left out: it would change
-        // what a pixel's worth of it adds by a thousandth of the slope.
+        // From pixel to pixel: z² times the slope of the inverse depth. Its derivative by the pose is left out: it would change
+        // the effect of a pixel's worth of it by a thousandth of the slope.
         let normal = rotation.column(2);
         let towards = normal.dot(&there.coords) / there.z;
         let steepest = (normal.x / intrinsics.fx).abs().max((normal.y / intrinsics.fy).abs());
@@ -158,8 +159,8 @@ mod tests {
     use super::*;
     use crate::se3;
 
-    /// Against differences of the prediction: of pose, size and every error of the depth camera. What a pixel's worth of the slope
-    /// adds turns with the pose by less than is asked for here.
+    /// Compared with differences of the prediction: by pose, size and every error of the depth camera. The effect of a pixel's
+    /// worth of the slope changes with the pose by less than the tolerance here.
     #[test]
     fn depths_turn_with_pose_size_and_bias_as_differences_say() {
         const STEP: f64 = 1e-6;

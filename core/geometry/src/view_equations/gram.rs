@@ -3,12 +3,12 @@
 /// What one corner contributes to a column: its derivative along x and along y in the image.
 pub type Pair = [f64; 2];
 
-/// Corners that are multiplied in one go: their columns stay in the innermost cache, and the sums in registers.
+/// Corners that are multiplied in one batch: their columns stay in the innermost cache, and the sums in registers.
 const AT_ONCE: usize = 16;
 
 /// `JᵀJ` of a matrix with two rows per corner and `4 QUADS` columns.
 ///
-/// The two rows are summed side by side until the end, so that two products take one instruction on any processor, and
+/// The two rows are summed in parallel until the end, so that two products take one instruction on any processor, and
 /// always in the same order.
 pub struct Gram<const QUADS: usize> {
     corners: [[[Pair; 4]; QUADS]; AT_ONCE],
@@ -60,11 +60,11 @@ impl<const QUADS: usize> Gram<QUADS> {
     }
 }
 
-/// The finished products, where they were summed: they are some kilobytes, which a view has no time to copy.
+/// The finished products, referenced in place: they are some kilobytes, too slow to copy for every view.
 pub struct Products<'a, const QUADS: usize>(&'a [[[[Pair; 4]; 4]; QUADS]; QUADS]);
 
 impl<const QUADS: usize> Products<'_, QUADS> {
-    /// Of two columns.
+    /// Product of two columns.
     pub fn at(&self, i: usize, j: usize) -> f64 {
         let (i, j) = (i.min(j), i.max(j));
         let [x, y] = self.0[i / 4][j / 4][i % 4][j % 4];

@@ -64,20 +64,20 @@ impl FreeParameters {
     }
 }
 
-/// What one view is seen through: lens and target, and how its corners count.
+/// The context of one view: lens and target, and the weights of its corners.
 #[derive(Debug, Clone, Copy)]
 pub struct ViewInput<'a> {
     /// The lens.
     pub intrinsics: &'a Intrinsics,
     /// The points of the target.
     pub board: &'a BoardPoints,
-    /// How the target is bent.
+    /// The bend of the target.
     pub shape: &'a BoardShape,
     /// The corners in the image.
     pub corners: &'a [Corner],
-    /// What makes their errors uncorrelated with unit variance.
+    /// The transform that makes their errors uncorrelated with unit variance.
     pub whitener: &'a Whitener,
-    /// What depths say of the target's pose, beside the corners; `None` where they do not count.
+    /// Depths that determine the target's pose in addition to the corners; `None` where they do not count.
     pub depths: Option<MeasuredDepths<'a>>,
 }
 
@@ -184,8 +184,8 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// The rows of all corners, whitened: six columns of the pose, those of the form, the residual, and `more` beside them, which
-    /// `fill` is given for every corner, with its rows before they are whitened.
+    /// The rows of all corners, whitened: six columns of the pose, those of the form, the residual, and `more` columns after
+    /// them, which `fill` computes for every corner from its rows before whitening.
     pub fn all(&self, more: usize, fill: impl Fn(&Corner, &[Pair], &mut [Pair])) -> Result<DMatrix<f64>, CameraError> {
         let columns = POSE + self.count + 1;
         let mut row = vec![Pair::default(); columns + more];
@@ -203,7 +203,7 @@ impl<'a> Rows<'a> {
     }
 
     /// The two rows of corner `i`: six columns of the pose, those of the form, and the residual; times the whitener of the
-    /// corner, where it has one of its own.
+    /// corner, where it has its own.
     #[expect(clippy::inline_always, reason = "the loop over the corners is the hot one, and has to see it")]
     #[inline(always)]
     pub fn fill(&self, i: usize, corner: &Corner, columns: &mut [Pair]) -> Result<(), CameraError> {

@@ -29,7 +29,7 @@ enum Count {
     Together,
 }
 
-/// Twenty corners a pixel or so off where they should be.
+/// Twenty corners about a pixel away from their places.
 fn view(distortion: Distortion, count: Count) -> View {
     let points: Vec<Point3<f64>> =
         (0..20).map(|i| Point3::new(f64::from(i % 5) * 0.03, f64::from(i / 5) * 0.03, 0.0)).collect();

@@ -1,4 +1,4 @@
-//! How the residuals of the corners of a view count.
+//! Weights of the residuals of the corners of a view.
 
 use std::sync::Arc;
 
@@ -6,19 +6,19 @@ use nalgebra::{DMatrix, Matrix2};
 
 use crate::targets::corner_covariance::CornerCovariance;
 
-/// How the residuals of the corners of a view count.
+/// Weights of the residuals of the corners of a view.
 #[derive(Debug, Clone, Default)]
 pub enum Whitener {
-    /// All alike.
+    /// All equal.
     #[default]
     Alike,
     /// One matrix `W` per corner, whose residual counts as `W r`.
     Each(Vec<Matrix2<f64>>),
-    /// Corners that do not err independently: by the covariance of all of them.
+    /// Corners whose errors are not independent: weights by the covariance of all of them.
     Together {
-        /// That of the corners in their order.
+        /// The covariance of the corners, in their order.
         covariance: Arc<CornerCovariance>,
-        /// The variance that a whitened number has, squared pixels.
+        /// The variance of a whitened number, squared pixels.
         unit_px2: f64,
     },
 }
@@ -33,7 +33,7 @@ impl Whitener {
         }
     }
 
-    /// That of corner `i` alone, where it has one.
+    /// The matrix of corner `i` alone, where it has one.
     pub fn of(&self, i: usize) -> Option<&Matrix2<f64>> {
         match self {
             Self::Each(all) => all.get(i),

@@ -14,12 +14,12 @@ const MOST_JOINTS: usize = 64;
 /// Numbers of a row without names that may be joint values, with one that counts before them.
 const ROW: std::ops::RangeInclusive<usize> = 4..=16;
 
-/// The joint values of a document, which may be none.
+/// The joint values of a document, if it has any.
 pub(super) fn of_document(value: &Value, file: &str) -> Option<JointSeries> {
     moveit(value, file).or_else(|| listed(value, file))
 }
 
-/// `joint_names` beside rows of `joint_values`, as MoveIt calibration keeps the states that it has been at.
+/// `joint_names` with rows of `joint_values`, as MoveIt calibration saves its robot states.
 fn moveit(value: &Value, file: &str) -> Option<JointSeries> {
     let joints: Vec<String> =
         value.get("joint_names")?.list().iter().map(|name| name.text().map(str::to_owned)).collect::<Option<_>>()?;
@@ -60,7 +60,7 @@ fn listed(value: &Value, file: &str) -> Option<JointSeries> {
     series(name, Vec::new(), None, samples.collect())
 }
 
-/// Rows of numbers without names, each with its image, its number and where it stands, as joint values that they may be.
+/// Rows of numbers without names, each with its image, its number and its place, as possible joint values.
 pub(crate) fn unnamed(
     name: &str,
     rows: impl Iterator<Item = (Option<String>, Option<u64>, Text, Vec<f64>)>,

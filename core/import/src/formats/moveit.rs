@@ -13,7 +13,7 @@ impl Format for MoveIt {
         text!("MoveIt calibration")
     }
 
-    /// Its files are documents of which only the names of the series say what they are.
+    /// Its files are documents that only the names of the series identify.
     fn sniff(&self, _file: &File) -> bool {
         false
     }

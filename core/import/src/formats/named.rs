@@ -1,5 +1,5 @@
-//! Poses of named fields: a translation beside a rotation, in fields of their own or as numbers by name, with what the names
-//! say of units and of the rotation.
+//! Poses of named fields: a translation and a rotation, in separate fields or as named numbers, with units and rotation
+//! convention from the names.
 
 use nalgebra::{Matrix3, Matrix4, Vector3};
 
@@ -9,12 +9,12 @@ use crate::conventions::{AngleUnit, LengthUnit, RotationForm, is_rotation, is_un
 use crate::recording::{Known, Numbers, Stated};
 use crate::value::Value;
 
-/// Fields of a map that are looked at by their names: each translation is compared with every rotation.
+/// Most fields of a map that are checked by their names: each translation is compared with every rotation.
 const MOST_FIELDS: usize = 256;
 
-/// A part of a pose, and what its names say.
+/// A part of a pose, and what its names state.
 struct Found<T> {
-    /// What the fields are of, in lower case; empty where their names say only what they are.
+    /// What the fields belong to, in lower case; empty where their names do not state it.
     whose: String,
     key: String,
     numbers: T,
@@ -42,7 +42,7 @@ pub(super) fn poses(value: &Value) -> Vec<(String, Numbers, Stated)> {
             })),
         }
     }
-    // A matrix says more than a quaternion, and that more than three numbers.
+    // A matrix is more specific than a quaternion, and that more than three numbers.
     called.sort_by_key(|found| std::cmp::Reverse(found.numbers.len()));
     rotations.extend(called);
     let mut out: Vec<(String, Numbers, Stated)> = Vec::new();
@@ -58,7 +58,7 @@ pub(super) fn poses(value: &Value) -> Vec<(String, Numbers, Stated)> {
         done.push(&translation.whose);
         let stated = Stated { length: translation.stated.length.clone(), ..rotation.stated.clone() };
         let pair = format!("{}+{}", rotation.key, translation.key);
-        // Whose poses these are is in no other name.
+        // No other name states whose poses these are.
         let name =
             if translation.whose.is_empty() && is_of_solve_pnp(&pair) { pair } else { translation.whose.clone() };
         out.push((name, numbers, stated));
@@ -159,7 +159,7 @@ fn three_angles(value: &Value, names: &[[&str; 3]]) -> Option<Found<Vec<f64>>> {
     })
 }
 
-/// Numbers of a rotation, with its meaning as far as the names say it.
+/// Numbers of a rotation, with its convention as far as the names state it.
 fn rotation(value: &Value) -> Option<Found<Vec<f64>>> {
     for keys in [["qx", "qy", "qz", "qw"], ["q_x", "q_y", "q_z", "q_w"], ["rot_x", "rot_y", "rot_z", "rot_w"]] {
         if let Some(numbers) = four(value, keys) {

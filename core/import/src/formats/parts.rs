@@ -1,4 +1,4 @@
-//! Series of which rotations and translations stand apart, as `calibrateHandEye` takes them.
+//! Series with separate rotations and translations, as `calibrateHandEye` takes them.
 
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ impl Part {
         (!rows.is_empty()).then(|| Self { name: path.to_owned(), rows })
     }
 
-    /// Whether its rows are those of one matrix: of a rotation, of a pose, of a camera.
+    /// Whether its rows are those of a matrix: of a rotation, of a pose, of a camera.
     fn is_matrix(&self) -> bool {
         let numbers = self.rows.concat();
         match (self.rows.len(), numbers.as_slice()) {
@@ -75,7 +75,7 @@ pub(crate) fn series(parts: &[Part], file: &str) -> Vec<Track> {
     tracks
 }
 
-/// What a part is of, by its name without what says which part it is.
+/// What a part belongs to, by the rest of its name.
 fn whose(name: &str) -> String {
     let name = name.to_lowercase();
     let last = last_of(&name);

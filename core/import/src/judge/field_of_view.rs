@@ -1,6 +1,6 @@
-//! Whether recorded poses of a target are of one that a camera sees. A robot's poses in their place give the same equations the other
-//! way round, and so do the inverses of both, with camera and target where the target and the camera would be; but no lens sees what is
-//! beside or behind it.
+//! Whether recorded poses of a target are of one that a camera sees. A robot's poses in their place give the same equations the
+//! other way round, and so do the inverses of both, with camera and target where the target and the camera would be; but no lens
+//! sees what is outside its field of view or behind it.
 
 use nalgebra::Isometry3;
 
@@ -9,10 +9,11 @@ use handeye_wording::text;
 
 /// Half of the field of lenses that calibrations are made with, radians: a fisheye of more sees a target at its border seldom.
 const HALF_FIELD_RAD: f64 = 70.0 * std::f64::consts::PI / 180.0;
-/// Of the views so many may be outside of it by a wrong row: a tenth, and one.
+/// Share of the views that may be outside of it by a wrong row: a tenth, plus one.
 const WRONG: usize = 10;
 
-/// That so many of the target's poses are outside of the field of every lens: beside the camera, or behind it.
+/// The reason, if too many of the target's poses are outside of the field of every lens: next to the camera, or behind
+/// it.
 pub(super) fn outside(seen: &[Isometry3<f64>]) -> Option<Text> {
     let is_outside = |pose: &&Isometry3<f64>| {
         let at = pose.translation.vector;

@@ -1,8 +1,8 @@
-//! What files and settings leave open of a recording, as cases for the engine of
-//! [`hypotheses`](handeye_estimate::diagnose::hypotheses), and what speaks against those that explain the views.
+//! The open conventions of a recording, as cases for the engine of
+//! [`hypotheses`](handeye_estimate::diagnose::hypotheses), and the objections to those that explain the views.
 //!
-//! Poses that map the other way with the camera in the other place give the same equations, so no data tell them apart. Both
-//! are listed; the one that puts the camera nearer to what carries it than the target is comes first.
+//! Poses that map the other way with the camera in the other place give the same equations, so no data distinguish them.
+//! Both are listed; the one that puts the camera nearer to what carries it than the target is comes first.
 
 mod cases;
 mod field_of_view;
@@ -29,26 +29,26 @@ use handeye_geometry::progress::{CancelToken, Work};
 use handeye_geometry::targets::TargetSpec;
 use trial::Judge;
 
-/// Views that are looked at to sort hypotheses.
+/// Views that are used to sort hypotheses.
 const MOST_QUICK: usize = 20;
 /// Hypotheses whose equations are solved, and of those the ones that may leave views out, which takes some ten times as long.
-/// Some hundreds of either are what a recording of one robot has; with so many a person waits for some seconds.
+/// A recording of one robot has some hundreds of either; this many take some seconds.
 const MOST_SOLVED: usize = 5000;
 const MOST_ROBUST: usize = 500;
 /// Hypotheses that are judged thoroughly.
 const MOST_JUDGED: usize = 40;
 /// Hypotheses that are kept for the list.
 const MOST_LISTED: usize = 24;
-/// Within this factor two hypotheses explain the same, and the commoner one comes first: a median of a dozen views is known no
-/// better.
+/// Within this factor two hypotheses explain the same, and the more common one comes first: a median of a dozen views is not
+/// more accurate.
 const TIE: f64 = 1.25;
 /// Poses of two series that differ by less than this [m, rad] are copies of each other, rounded otherwise.
 const COPY: f64 = 1e-4;
 
-/// What was seen in each source: streams by their corners, series by themselves.
+/// What was seen in each source: corners for streams, poses for series.
 #[derive(Debug, Default)]
 pub struct Sights {
-    /// Of [`Recording::streams`], where the target was found.
+    /// Views of [`Recording::streams`], where the target was found.
     pub streams: Vec<Option<Sight>>,
     /// The target, where it is known.
     pub target: Option<TargetSpec>,
@@ -59,20 +59,20 @@ pub struct Sights {
 pub struct Judgement {
     /// The best first.
     pub hypotheses: Vec<Hypothesis>,
-    /// How many were tried.
+    /// Number of hypotheses that were tried.
     pub tried: usize,
-    /// How many more there are, which were not: more than one can tell apart. A person who names series leaves fewer.
+    /// Number of further ones that were not tried: more than can be distinguished. Naming the series reduces them.
     pub untried: usize,
-    /// How many pairs of a series of the robot and of what the camera saw were not looked at.
+    /// Number of pairs of a robot series and a source that were not tried.
     pub sources_untried: usize,
     /// Median distance of the target from the camera under the best, metres.
     pub distance_m: f64,
-    /// What follows.
+    /// The conclusion.
     pub verdict: Verdict,
 }
 
 impl Judgement {
-    /// Whether all that is open is where the camera sits, which no data tell: the same files, pairing and numbers explain the
+    /// Whether only the place of the camera is open, which no data show: the same files, pairing and numbers explain the
     /// recording in both places.
     pub fn is_open_in_mode_alone(&self) -> bool {
         match self.hypotheses.as_slice() {
@@ -91,7 +91,7 @@ impl Judgement {
 ///
 /// # Errors
 /// [`ImportError::NoPoses`] without a series to try, [`ImportError::NothingLeft`] where settings exclude all,
-/// [`ImportError::BadChoice`] for a name that there is not, [`ImportError::NoViews`] where nothing has a solution.
+/// [`ImportError::BadChoice`] for an unknown name, [`ImportError::NoViews`] where nothing has a solution.
 pub fn judge(
     recording: &Recording,
     sights: &Sights,
@@ -159,7 +159,7 @@ fn verdict_on(found: &mut [Hypothesis]) -> Verdict {
     };
     let scores: Vec<Score> = found.iter().map(score).collect();
     match hypotheses::verdict(&scores) {
-        // What was paired by what the images show rests on the answer itself.
+        // A pairing by image content depends on the answer itself.
         Verdict::Decided if found[0].pairing.is_by_content => Verdict::Ambiguous(1),
         verdict => verdict,
     }
@@ -170,9 +170,9 @@ fn misfit(h: &Hypothesis) -> f64 {
     h.fit.as_ref().map_or(f64::INFINITY, |fit| fit.relative)
 }
 
-/// How common something is; fewer is commoner.
+/// How uncommon a hypothesis is; smaller is more common.
 fn rarity(recording: &Recording, h: &Hypothesis) -> (usize, usize, usize, usize, usize) {
-    // Which of the two places of the camera is the likelier one.
+    // Which of the two places of the camera is more likely.
     let far = h.fit.as_ref().is_some_and(|fit| (fit.camera_at_m < fit.target_at_m) != (h.mode == Mode::EyeInHand));
     let numbers = recording.tracks[h.robot].samples.first().map(|s| s.numbers);
     let forms = numbers.map(|n| RotationForm::all_for(&n)).unwrap_or_default();
@@ -229,7 +229,7 @@ fn sees_the_same(recording: &Recording, a: &Hypothesis, b: &Hypothesis) -> bool 
         && of_a.iter().zip(of_b).all(|(of_a, of_b)| are_equal(seen(a, of_a), seen(b, of_b), (COPY, COPY)))
 }
 
-/// Whether every image has the same pose of the robot under both, however it is written and wherever it stands.
+/// Whether every image has the same pose of the robot under both, however and wherever it is written.
 fn poses_are_equal(recording: &Recording, a: &Hypothesis, b: &Hypothesis) -> bool {
     let by_image = |h: &Hypothesis| -> BTreeMap<usize, Option<Pose<Base, Tip>>> {
         let samples = &recording.tracks[h.robot].samples;
@@ -246,7 +246,7 @@ fn poses_are_equal(recording: &Recording, a: &Hypothesis, b: &Hypothesis) -> boo
         && of_a.iter().zip(&of_b).all(|((image_a, a), (image_b, b))| image_a == image_b && are_equal(*a, *b, within))
 }
 
-/// Whether two poses are the same within metres and radians, or neither is there.
+/// Whether two poses are the same within metres and radians, or both are absent.
 fn are_equal<A: Frame, B: Frame>(a: Option<Pose<A, B>>, b: Option<Pose<A, B>>, within: (f64, f64)) -> bool {
     let Some((a, b)) = a.zip(b) else { return a.is_none() && b.is_none() };
     let (metres, radians) = a.distance_to(&b);

@@ -1,4 +1,4 @@
-//! Poses that a camera was given by the target that it sees, and none of a robot.
+//! Poses that a camera was given by the target that it sees, and that are not a robot's.
 //!
 //! # How they are recognised
 //! With `A` a pose as it is read and `C` the target's pose in the camera, the hand-eye equation `A X C = Y` holds for every arm.
@@ -8,9 +8,9 @@
 //! - the target carries itself: `Y` puts the origin on the target, and turns axes into axes (tools count points from a corner, from
 //!   the middle, or from the outer edge).
 //!
-//! One of both is nothing special: a TCP that was calibrated to the camera gives the first, a base that was taught on the target or
-//! a world that is the target's frame the second. Only both together are taken for the camera's own poses. The first alone is, where poses and images
-//! agree far better than the noise of the corners allows: an arm knows nothing of that noise.
+//! One of both alone is common: a TCP that was calibrated to the camera gives the first, a base that was taught on the target or a
+//! world that is the target's frame the second. Only both together count as the camera's own poses. The first alone does where
+//! poses and images agree far better than the noise of the corners allows: an arm is independent of that noise.
 //!
 //! # Tolerances
 //! The poses come from another program with another lens: a focal length that is off by a twentieth moves the camera by a twentieth
@@ -24,29 +24,29 @@ use handeye_estimate::diagnose::hypotheses::{EXPLAINED, EXPLAINED_RAD};
 use handeye_estimate::handeye::closed_form::ClosedFormSolution;
 use handeye_geometry::se3;
 
-/// How far beyond the outermost points the origin may be, by the size of the target: the edge of a board is a square away, a third of
-/// the smallest boards that are detected.
+/// How far beyond the outermost points the origin may be, relative to the size of the target: the edge of a board is a square away,
+/// a third of the smallest boards that are detected.
 const BESIDE: f64 = 1.0 / 3.0;
-/// Squares of residuals over those that the noise of the corners causes, per degree of freedom and at the median of the views, below
-/// which poses know of that noise. An arm's are 1 or more; one view is below by chance in 700 where six views leave two thirds of
-/// their degrees of freedom (χ² of 6), and most of six are less than once in a million.
+/// Squares of residuals over those that the noise of the corners causes, per degree of freedom and at the median of the views,
+/// below which poses know of that noise. An arm's are 1 or more; one view is below by chance in 700 where six views leave two
+/// thirds of their degrees of freedom (χ² of 6), and most of six are less than once in a million.
 const KNOWS_THE_NOISE: f64 = 0.05;
 /// Views from which that is judged.
 const NEED: usize = 6;
-/// Frames that are the same to a hundredth of the distance and 0.6°: what is left where two cameras see the same target.
+/// Frames that are the same to a hundredth of the distance and 0.6°: the residual where two cameras see the same target.
 const SAME: f64 = 0.01;
 
-/// Whose poses they are.
+/// Owner of the poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum PoseOwner {
-    /// Those of the camera that saw the target.
+    /// The camera that saw the target.
     Camera,
-    /// Those of another camera that sees the same target; a base that was taught on the target looks the same.
+    /// Another camera that sees the same target; a base that was taught on the target looks the same.
     OtherCamera,
 }
 
-/// Whose poses a solution tells; `None`: those of an arm, as far as can be told. `over_noise` is the square of the residual of every
-/// view over what the noise of its corners causes.
+/// The owner of the poses by a solution; `None`: an arm, as far as can be determined. `over_noise` is the square of the residual of
+/// every view over what the noise of its corners causes.
 pub(super) fn whose(sight: &Sight, solution: &ClosedFormSolution, over_noise: &[f64]) -> Option<PoseOwner> {
     let is_camera = is_of_camera(solution.mount_from_camera.isometry(), sight.target.distance_m);
     let anchor_from_target = solution.anchor_from_target.isometry();
@@ -99,7 +99,8 @@ fn is_along_axes(rotation: &UnitQuaternion<f64>) -> bool {
         for (row, column) in order.iter().enumerate() {
             nearest[(row, *column)] = matrix[(row, *column)].signum();
         }
-        // By quaternions: the angle of a matrix is that of its trace, and of one that rounding has made larger than 3 it is none.
+        // By quaternions: the angle of a matrix is computed from its trace, which is invalid where rounding made that exceed
+        // three.
         let nearest = Rotation3::from_matrix_unchecked(nearest);
         nearest.matrix().determinant() > 0.0 && UnitQuaternion::from(nearest).angle_to(rotation) < EXPLAINED_RAD
     })

@@ -5,7 +5,7 @@ use crate::hypothesis::{Hypothesis, Source};
 use handeye_estimate::diagnose::hypotheses::{rules_out, scale};
 use handeye_wording::text;
 
-/// No printer is off by this much; what is nearer is for the calibration to say, which estimates it.
+/// No printer has this much error; smaller factors are left to the calibration, which estimates them.
 const PRINTED: f64 = 1.1;
 
 /// Says of hypotheses that explain the images that another size of the target explains them far better.

@@ -29,27 +29,27 @@ use handeye_geometry::targets::{AprilGrid, AprilTag, TargetSpec};
 use handeye_wording::text;
 use handeye_wording::{Text, Value};
 
-/// A view disagrees beyond so many times the median, and beyond this part of the distance.
+/// A view disagrees beyond this many times the median, and beyond this part of the distance.
 const DISAGREES: f64 = 5.0;
 const DISAGREES_OF_DISTANCE: f64 = 3e-3;
 /// Views by which the best are judged.
 const MOST_VIEWS: usize = 400;
-/// Views that disagree for which a pose that fits better is looked for among all.
+/// Views that disagree for which a pose that fits better is searched among all.
 const MOST_LOOKED_FOR: usize = 50;
 
-/// What was seen of a source, by how its poses were read where they are a series.
+/// Views of a source, by how its poses were read where they are a series.
 type SightsRead = HashMap<(Source, Option<(Reading, Direction)>), Rc<Sight>>;
 
-/// What hypotheses are tried with.
+/// Shared data for trying hypotheses.
 pub(super) struct Judge<'a> {
     pub recording: &'a Recording,
     pub sights: &'a Sights,
     pub paired: &'a [Paired],
     pub settings: &'a Settings,
     pub cancel: &'a CancelToken,
-    /// What was seen, with what was read already of series: many cases share them.
+    /// Views of sources that were read already: many cases share them.
     pub read: RefCell<SightsRead>,
-    /// Series of which it was found that their poses are a camera's own, and why: no robot's for any other camera either.
+    /// Series whose poses were found to be a camera's own, and why: they are not a robot's for any other camera either.
     pub own: RefCell<BTreeMap<usize, Text>>,
 }
 
@@ -84,7 +84,7 @@ impl Trial<'_> {
         self.seen.iter().filter_map(view).collect()
     }
 
-    /// How far a solution puts the target of an image from where it was seen with a pose of the series, metres.
+    /// Distance of the target of an image by a solution and a pose of the series from where it was seen, metres.
     fn misfit_at(&self, solution: &ClosedFormSolution, sample: usize, image: usize) -> Option<f64> {
         Some(self.sight.target.misfit(solution, &self.pair_of(sample, image)?).0)
     }
@@ -161,7 +161,7 @@ impl Judge<'_> {
         Some((trial.sight.target.clone(), views.map(|view| view.pair).collect()))
     }
 
-    /// What the size of the target would be called.
+    /// The name of the target's size.
     pub fn size_of_target(&self, scale: f64) -> Option<Text> {
         let mm = |length_m: f64| format!("{:.2}", length_m * scale * 1e3);
         Some(match self.sights.target? {
@@ -222,7 +222,7 @@ impl Judge<'_> {
             }
             disagreeing.push((view.sample, *misfit_m));
             // Views that were exchanged or shifted leave the other pose without its image. Where that has it, this view's own
-            // pose is wrong, or its image a copy: one view less, which says nothing of the others.
+            // pose is wrong, or its image a copy: one view less, without consequence for the others.
             if contradictions.len() < 3
                 && disagreeing.len() <= MOST_LOOKED_FOR
                 && let Some((other, other_m)) = trial.better(solution, view, *misfit_m, limit)
@@ -257,11 +257,11 @@ impl Judge<'_> {
         (fit, contradictions)
     }
 
-    /// That these poses are those of a camera, and none of a robot.
+    /// The reason, if these poses are those of a camera and not of a robot.
     fn own_poses(&self, trial: &Trial<'_>, solution: &ClosedFormSolution, views: &[View]) -> Option<Text> {
         let (case, sight) = (trial.case, &*trial.sight);
         let over_noise = |view: &View| {
-            // However the target was counted: its numbers say nothing of the noise.
+            // However the target was counted: its numbers do not affect the noise.
             let covariance = sight.covariances.get(view.image).filter(|_| sight.target.turns.is_empty())?.as_ref()?;
             own_poses::over_noise(&chain(solution, &view.pair), view.pair.camera_from_target.isometry(), covariance)
         };
@@ -278,8 +278,8 @@ impl Judge<'_> {
                 self.own.borrow_mut().insert(case.robot, why.clone());
                 Some(why)
             }
-            // A person who names the series has said whose it is, and so has a file that calls it the robot's. Of one camera alone
-            // with neutral names the base may be the target's frame.
+            // A user who names the series has decided whose it is, and so has a file that names it the robot's. With a single
+            // camera and neutral names the base may be the target's frame.
             PoseOwner::OtherCamera => {
                 let cameras = self.recording.streams.iter().filter(|stream| !stream.is_depth).count();
                 let may_be = matches!(case.source, Source::Track(_)) || cameras > 1;
@@ -310,7 +310,7 @@ impl Judge<'_> {
     }
 
     /// Contradicts hypotheses that put a recorded target where no lens sees it, where another one explains the recording and does
-    /// not: a marker's frame need not be that of a lens, so that alone it says nothing.
+    /// not: a marker's frame need not be that of a lens, so this alone proves nothing.
     pub fn contradict_outside(&self, hypotheses: &mut [Hypothesis]) {
         let outside = |h: &Hypothesis| {
             let case = Case::of(h);
@@ -364,7 +364,7 @@ impl Judge<'_> {
                 let leave_out = disagrees_m(found.median_m, &trial.sight.target);
                 let cost = |sample: usize, image: usize| match trial.sight.seen.get(image) {
                     Some(Some(_)) => trial.misfit_at(&found.solution, sample, image).unwrap_or(f64::INFINITY),
-                    // An image without the target says nothing against a pose.
+                    // An image without the target does not contradict a pose.
                     _ => 1.5 * leave_out,
                 };
                 pairing = pairing::by_content(aligned(poses, images, leave_out, cost));

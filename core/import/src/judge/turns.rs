@@ -7,11 +7,11 @@ use super::trial::Judge;
 use crate::conventions::{AngleUnit, Reading, RotationForm};
 use handeye_estimate::diagnose::hypotheses::turns::{limit_rad, unlike_rad};
 
-/// What of a reading turns depend on. Units of length, directions and places of the camera have the same.
+/// The parts of a reading that rotations depend on. Units of length, directions and places of the camera have the same.
 type Rotations = (RotationForm, AngleUnit);
 
-/// Keeps the cases in which robot and target turn alike, the most alike where there are more than `most`; how many of them are
-/// left out for that alone.
+/// Keeps the cases with similar rotations of robot and target, the most similar where there are more than `most`; returns how
+/// many are left out for that alone.
 pub(super) fn keep_alike(judge: &Judge<'_>, cases: &mut Vec<Case>, most: usize) -> usize {
     let rotations = |reading: &Reading| (reading.rotation, reading.angle);
     let mut known: HashMap<(usize, Rotations, Option<Rotations>), f64> = HashMap::new();

@@ -20,7 +20,7 @@ use crate::{HandEyeError, PosePair};
 /// Three views, turned about two axes that are not parallel, with the mount moved as well as turned: the size of `M`
 /// follows from the translations alone. It need not become 1, and an error of it goes into `t`, which makes this
 /// the weakest of the `A X = X B` methods with noise (2 to 9 times the error of the others at 0.1 px or less, more with
-/// fewer or worse views). Elements of a matrix and metres stand in one sum of squares, so the unit of length matters.
+/// fewer or worse views). Elements of a matrix and metres are in one sum of squares, so the unit of length matters.
 /// Half turns need no care: no axis is taken.
 /// # Errors
 /// As [`ClosedForm::solve`]; [`HandEyeError::NoSolution`] when nothing fixes the size of `M`, or when it is not between

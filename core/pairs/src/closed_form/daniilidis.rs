@@ -22,7 +22,7 @@ use handeye_geometry::se3::skew;
 /// # Needs
 /// Three views, turned about two axes that are not parallel. The real parts, equal for exact motions by the theorem
 /// of screw congruence, are not used, so that with noise the axes of the frames matter. Rotations and half metres
-/// stand in one sum of squares, so the unit of length does too. Quaternion signs as for [`Horaud`](super::Horaud).
+/// are in one sum of squares, so the unit of length matters too. Quaternion signs as for [`Horaud`](super::Horaud).
 /// # Errors
 /// As [`ClosedForm::solve`]; [`HandEyeError::NoSolution`] when half turns leave the rotation open, when more than two
 /// singular vectors are null, or when the noise leaves no real combination of the two (OpenCV returns NaN).

@@ -17,7 +17,7 @@ use crate::{HandEyeError, PosePair};
 /// Three views, turned about two axes that are not parallel. Wide turns count most, motions between repeated poses not
 /// at all.
 /// The quaternions of `A` and `B` must have matching signs: positive real parts, as in OpenCV, and next to a half
-/// turn the sign that the other motions ask for.
+/// turn the sign that the other motions require.
 /// # Errors
 /// As [`ClosedForm::solve`]; [`HandEyeError::NoSolution`] when half turns leave the rotation open, or when the camera
 /// did not turn as the robot did.

@@ -139,7 +139,7 @@ fn rotate(columns: &mut [DVector<f64>], i: usize, j: usize, sin: f64, cos: f64) 
 
 /// The rotation nearest to a multiple of `m`, which may be negative: linear solutions come without scale or sign.
 ///
-/// `None` when `m` is singular within [`RANK_TOLERANCE`], so that no rotation is meant by it.
+/// `None` when `m` is singular within [`RANK_TOLERANCE`], so that it does not represent a rotation.
 pub(super) fn rotation_up_to_scale(m: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
     let size = m.norm();
     if !size.is_finite() || size < f64::MIN_POSITIVE {

@@ -3,12 +3,12 @@
 //! Five solve `A X = X B` over the relative motions of all pairs of views, two solve `A X = Z B` over the views
 //! themselves; [`all`] lists them. They follow the variants that OpenCV's `calibrateHandEye` and
 //! `calibrateRobotWorldHandEye` use and agree with version 4.14 to 1e-9; where a file here departs from OpenCV, it is
-//! in a case that OpenCV answers wrongly or not at all, and its documentation says so.
+//! in a case that OpenCV answers wrongly or not at all, and its documentation states that.
 //!
-//! None of them weights its data, so none is the estimate to trust: they start the joint estimation, and their
-//! disagreement tells how well the views determine the answer. With exact data all are exact. With noise, most
-//! depend on choices that should not matter: on where the origin or the axes of a frame were put, and the methods over
-//! pairs, which take each pair in one direction only, on the order of the views:
+//! None of them weights its data, so none is the final estimate: they start the joint estimation, and their
+//! disagreement shows how well the views determine the answer. With exact data all are exact. With noise, most depend
+//! on choices that should not matter: on the choice of the origin or the axes of a frame, and the methods over pairs,
+//! which take each pair in one direction only, on the order of the views:
 //!
 //! | method | anchor | mount | camera | target | order of views |
 //! | --- | --- | --- | --- | --- | --- |
@@ -44,7 +44,7 @@ use super::{HandEyeError, PosePair, motion};
 use handeye_geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use handeye_geometry::se3;
 
-/// What a closed form finds.
+/// Result of a closed form.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClosedFormSolution {
     /// The hand-eye transform.
@@ -71,12 +71,12 @@ pub fn all() -> [&'static dyn ClosedForm; 7] {
     [&TsaiLenz, &ParkMartin, &Horaud, &Andreff, &Daniilidis, &Shah, &Li]
 }
 
-/// The method of that [name](ClosedForm::name), for instance `"park_martin"`; `None` when there is none.
+/// The method with that [name](ClosedForm::name), for instance `"park_martin"`; `None` when there is none.
 pub fn by_name(name: &str) -> Option<&'static dyn ClosedForm> {
     all().into_iter().find(|method| method.name() == name)
 }
 
-/// Checks the views of a closed form; the first thing that every method does.
+/// Checks the views of a closed form; the first step of every method.
 fn check(views: &[PosePair]) -> Result<(), HandEyeError> {
     let anchor_from_mount: Vec<_> = views.iter().map(|view| view.anchor_from_mount).collect();
     motion::analyse(&anchor_from_mount)?;
@@ -100,7 +100,7 @@ fn with_mean_target(
     method.finite(ClosedFormSolution { mount_from_camera, anchor_from_target: Pose::from_isometry(mean) })
 }
 
-/// Which method is at work on how many views, for its errors.
+/// Name of the method and number of views, for its errors.
 struct Method {
     name: &'static str,
     views: usize,
@@ -111,7 +111,7 @@ impl Method {
         HandEyeError::NoSolution { method: self.name, views: self.views, reason }
     }
 
-    /// Passes a solution on unless it overflowed.
+    /// Returns a solution unless it overflowed.
     fn finite(&self, solution: ClosedFormSolution) -> Result<ClosedFormSolution, HandEyeError> {
         if solution.mount_from_camera.is_finite() && solution.anchor_from_target.is_finite() {
             Ok(solution)

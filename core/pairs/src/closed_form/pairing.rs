@@ -1,4 +1,4 @@
-//! The relative motions of all pairs of views, as robot and camera saw them, and what the `A X = X B` methods share.
+//! The relative motions of all pairs of views, as measured by robot and camera, and what the `A X = X B` methods share.
 
 use nalgebra::{Matrix3, Matrix4, Quaternion, SMatrix, SymmetricEigen, UnitQuaternion, Vector3, Vector4};
 
@@ -13,7 +13,7 @@ const HALF_TURN_RAD: f64 = 2.6f64.to_radians();
 
 /// One relative motion: `mount * X = X * camera` with `X = mount_from_camera`.
 ///
-/// The rotations carry quaternions of matching sign, so that their vectors are opposite for no pair.
+/// The rotations carry quaternions of matching sign, so that their vectors are not opposite for any pair.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Motion {
     /// `A`: `mount_j_from_mount_i`.
@@ -97,8 +97,9 @@ pub(super) fn completed(
 /// from the rotation that the other motions determine.
 ///
 /// # Errors
-/// [`HandEyeError::NoSolution`] when the other motions do not determine a rotation. Then no other method could have
-/// chosen either: motions that are half turns or turns about one axis fix the answer only up to a half turn.
+/// [`HandEyeError::NoSolution`] when the other motions do not determine a rotation. Then no other method could
+/// determine the sign either: motions that are half turns or turns about one axis fix the answer only up to a half
+/// turn.
 pub(super) fn aligned_motions(method: &Method, views: &[PosePair]) -> Result<Vec<Motion>, HandEyeError> {
     let mut motions = motions(views);
     if !motions.iter().any(Motion::is_half_turn) {

@@ -55,7 +55,7 @@ fn rotation(motions: &[Motion]) -> Option<UnitQuaternion<f64>> {
     Some(UnitQuaternion::from_rotation_matrix(&se3::nearest_rotation(&correlation)))
 }
 
-/// Axis times angle of this quaternion rather than of its opposite, which tells the two sides of a half turn apart.
+/// Axis times angle of this quaternion rather than of its opposite, which distinguishes the two sides of a half turn.
 fn rotation_vector(rotation: &UnitQuaternion<f64>) -> nalgebra::Vector3<f64> {
     if rotation.w >= 0.0 {
         return se3::rotation_vector(rotation);

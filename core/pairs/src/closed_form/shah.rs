@@ -19,8 +19,8 @@ use handeye_geometry::frames::Pose;
 /// Views hold `anchor_from_mount` and `camera_from_target`, metres. The results map camera to mount and target to
 /// anchor coordinates.
 /// # Needs
-/// Three views, turned about two axes that are not parallel. Every view counts alike, so a repeated pose counts double.
-/// Half turns need no care, unless there are no other turns.
+/// Three views, turned about two axes that are not parallel. Every view has the same weight, so a repeated pose counts
+/// double. Half turns need no care, unless there are no other turns.
 /// # Errors
 /// As [`ClosedForm::solve`]; [`HandEyeError::NoSolution`] when two pairs of singular vectors fit equally well.
 /// # Reference

@@ -26,11 +26,10 @@ const LARGEST_CHORD: f64 = 1.7;
 /// # Frames and units
 /// Views hold `anchor_from_mount` and `camera_from_target`, metres. The result maps camera to mount coordinates.
 /// # Needs
-/// Three views, turned about two axes that are not parallel by 17.3° to 116.4°, seen by robot and camera alike; other
-/// motions are left out.
-/// Near a half turn of the camera on its mount `x` grows without bound and noise pulls the angle below 180°, so
-/// another method is then the better one. When `x` does not exist within rounding (condition number 1e10),
-/// the camera is turned by the half turn about x, y or z that conditions the system best, and turned back.
+/// Three views, turned about two axes that are not parallel by 17.3° to 116.4°, seen by both robot and camera; other
+/// motions are left out. Near a half turn of the camera on its mount `x` grows without bound and noise pulls the angle
+/// below 180°, so another method is then the better one. When `x` does not exist within rounding (condition number
+/// 1e10), the camera is turned by the half turn about x, y or z that conditions the system best, and turned back.
 /// # Errors
 /// As [`ClosedForm::solve`]; [`HandEyeError::NoSolution`] when the turns of that size do not span two axes (OpenCV
 /// returns the identity).

@@ -1,4 +1,4 @@
-//! Views of a board at random: wholly in the image, near enough to be found, as tilted as a detector bears.
+//! Views of a board at random: wholly in the image, near enough to be found, as tilted as a detector tolerates.
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
 use rand::RngExt as _;
@@ -9,10 +9,11 @@ use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Camera, Pose, Target};
 use handeye_geometry::targets::TargetSpec;
 
-/// Standard deviations of where the board is expected that it stays in the image by: one view in eighty is cut on a side.
+/// Margin to the edge of the image in standard deviations of the expected place of the board: one view in eighty is cut
+/// on a side.
 const SURE: f64 = 2.5;
 
-/// Which views of a board are looked for.
+/// Range of the views of a board that are searched.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ViewRange {
     /// Nearest and farthest distance from the camera to the middle of the board \[m\].
@@ -25,14 +26,14 @@ pub struct ViewRange {
     pub spacing_px: f64,
 }
 
-/// Tilt that every detector of targets bears.
+/// Tilt that every detector of targets tolerates.
 const TILT_RAD: f64 = 50.0 * std::f64::consts::PI / 180.0;
-/// What is printed about the outermost points, in squares.
+/// Width of the print around the outermost points, in squares.
 const BORDER_SQUARES: f64 = 1.0;
 
 impl ViewRange {
-    /// About the distances \[m\] that somebody chose to see the board from: from two thirds of the nearest to one and a half
-    /// times the farthest, where cameras of a fixed focus are still sharp.
+    /// A range around the distances \[m\] from which a person chose to view the board: from two thirds of the nearest to one
+    /// and a half times the farthest, where cameras of a fixed focus are still sharp.
     pub fn about(distances_m: impl Iterator<Item = f64>) -> Option<Self> {
         let (nearest, farthest) =
             distances_m.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), d| (low.min(d), high.max(d)));
@@ -45,7 +46,7 @@ impl ViewRange {
     }
 
     /// A view with the middle of the board anywhere in the image, turned and tilted at random. Whether it is wholly in the
-    /// image is another question, see [`Self::shows`].
+    /// image is checked separately, see [`Self::shows`].
     pub fn draw(
         &self,
         rng: &mut ChaCha8Rng,
@@ -87,7 +88,7 @@ impl ViewRange {
         outline(target).iter().all(inside) && self.is_large(intrinsics, target, pose)
     }
 
-    /// Whether it is in spite of what is not known, with `doubts` times the usual margin for that.
+    /// Whether it is in spite of the uncertainty, with `doubt_factor` times the usual margin for that.
     pub(crate) fn surely_shows(&self, target: &TargetSpec, expected: &ExpectedPixels<'_>, doubt_factor: f64) -> bool {
         let intrinsics = expected.intrinsics();
         let inside = |point: &Point3<f64>| {
@@ -98,7 +99,7 @@ impl ViewRange {
         outline(target).iter().all(inside) && self.is_large(intrinsics, target, expected.camera_from_target())
     }
 
-    /// Whether a pixel that is known to within so much is in the image, with the margin.
+    /// Whether a pixel with this uncertainty is in the image, with the margin.
     fn holds(&self, intrinsics: &Intrinsics, px: &Vector2<f64>, within_px: &Vector2<f64>) -> bool {
         let last = [f64::from(intrinsics.width) - 1.0, f64::from(intrinsics.height) - 1.0];
         let free = within_px.map(|px| px + self.margin_px - 0.5);

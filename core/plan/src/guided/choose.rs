@@ -1,4 +1,4 @@
-//! Which views to take next: of many at random those that together lower the error most, and that the arm gets to.
+//! Which views to take next: of many random ones those that together lower the error most, and that the arm reaches.
 
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
@@ -22,14 +22,14 @@ use handeye_geometry::targets::TargetSpec;
 
 /// Draws for each candidate that is wanted: most views at random are not wholly in the image.
 const DRAWS_PER_CANDIDATE: usize = 40;
-/// Candidates whose way is looked for before it is given up: where so many of the best cannot be reached, the rest gains
-/// little.
+/// Candidates to which a path is searched before giving up: where this many of the best cannot be reached, the rest
+/// gains little.
 const MOST_WAYS: usize = 400;
 /// Passes over the plan that take one view out and the best one in.
 const EXCHANGES: usize = 3;
-/// Part of the error by which an exchange has to be better.
+/// Fraction of the error by which an exchange has to be better.
 const EXCHANGE_GAIN: f64 = 1e-3;
-/// A view that failed is not tried again so near [m, rad].
+/// A failed view is not tried again within this distance [m, rad].
 const FAILED_NEAR: (f64, f64) = (0.04, 8.0 * std::f64::consts::PI / 180.0);
 
 /// An arm that is driven, and what it must not touch.
@@ -37,11 +37,11 @@ const FAILED_NEAR: (f64, f64) = (0.04, 8.0 * std::f64::consts::PI / 180.0);
 pub struct Robot {
     /// The arm, with what is on its tip.
     pub arm: Arm,
-    /// What stands around, besides the board.
+    /// The surroundings, without the board.
     pub around: Surroundings,
     /// Free space around arm and tool, metres.
     pub clearance_m: f64,
-    /// Where its joints are, radians; of a prismatic joint metres.
+    /// Its joint values, radians; metres for a prismatic joint.
     pub joints: JointValues,
     /// How fast they are driven.
     pub pace: Pace,
@@ -49,7 +49,7 @@ pub struct Robot {
     pub sight: Option<Sight>,
 }
 
-/// What is asked of a plan.
+/// Options of a plan.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ChooseOptions<'a> {
     /// Views that are compared.
@@ -58,30 +58,30 @@ pub(crate) struct ChooseOptions<'a> {
     pub ahead: usize,
     /// Seed of the candidates.
     pub seed: u64,
-    /// What a capture takes after the arm has arrived, seconds.
+    /// Duration of a capture after the arm has arrived, seconds.
     pub dwell_s: f64,
     /// Views that failed: not tried again, nor their neighbourhood.
     pub failed: &'a [Pose<Base, Tip>],
     /// How far the tip may turn from the nearest view so far, radians.
     pub turn_rad: f64,
-    /// Factor on how unsure it is where the board will be in the image; 1 as long as it was where it was expected.
+    /// Factor on the uncertainty of the place of the board in the image; 1 as long as it was where expected.
     pub doubt_factor: f64,
 }
 
 /// A view that is proposed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proposal {
-    /// Where the tip goes.
+    /// Pose of the tip.
     pub base_from_tip: Pose<Base, Tip>,
-    /// Where the board is expected.
+    /// Expected pose of the board.
     pub camera_from_target: Pose<Camera, Target>,
     /// The joint values there; `None` for an arm whose chain is not known.
     pub joints: Option<JointValues>,
-    /// How long the arm is on its way from where it is, seconds; zero for an arm whose chain is not known.
+    /// Travel time of the arm from its present configuration, seconds; zero for an arm whose chain is not known.
     pub travel_s: f64,
     /// Expected error over the box with it and those before it in the plan, over that without any of them.
     pub error_ratio: f64,
-    /// What it tells most of, weighed by what that does to the tip.
+    /// What it determines most, weighted by the effect on the tip.
     pub part: Part,
 }
 
@@ -102,24 +102,24 @@ pub(crate) struct Chooser<'a> {
     /// The model of the calibration so far.
     pub model: &'a ViewModel,
     pub target: &'a TargetSpec,
-    /// Which views of it are looked for.
+    /// Range of the views of it that are searched.
     pub range: &'a ViewRange,
     /// The arm, if it is driven and its chain is known.
     pub robot: Option<&'a Robot>,
-    /// How the arm of the views stands, if its joints are known.
+    /// The reach of the arm of the views, if its joints are known.
     pub reach: Option<&'a Reach>,
     /// Tip poses of the views so far.
     pub taken: &'a [Pose<Base, Tip>],
-    /// Ends the search: what is found is then shorter, or nothing.
+    /// Ends the search: the plan is then shorter, or empty.
     pub cancel: &'a CancelToken,
 }
 
-/// How the arm gets to a candidate.
+/// How the arm moves to a candidate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Way {
     Unknown,
     None,
-    /// To its pose; whether the path there from where the arm is is free is another question.
+    /// To its pose; whether the path from the present configuration is free is checked separately.
     To {
         joints: Option<JointValues>,
         travel_s: f64,
@@ -134,12 +134,12 @@ struct Candidate {
 }
 
 impl Chooser<'_> {
-    /// Plans the next views from what the views so far leave open. The same arguments give the same plan; cancelled, it is
-    /// shorter or empty.
+    /// Plans the next views by the uncertainty that the views so far leave. The same arguments give the same plan;
+    /// cancelled, it is shorter or empty.
     ///
     /// Greedy, view by view, each the one of all candidates after which the expected error is least; then one view after
     /// the other is taken out of the plan for the best one in its place, while that helps. Of the plan that view comes
-    /// first which lowers the error most over the square root of its time, of those that the arm can be driven to on a
+    /// first which lowers the error most over the square root of its time, among those that the arm reaches on a
     /// straight path in joint space.
     pub fn plan(&self, design: &Design, options: &ChooseOptions<'_>) -> Plan {
         let mut pool = self.pool(design, options);
@@ -164,7 +164,7 @@ impl Chooser<'_> {
         Plan { proposals, best_ratio, candidates: pool.len() }
     }
 
-    /// A view at random that the arm gets to on a straight path in joint space.
+    /// A random view that the arm reaches on a straight path in joint space.
     pub(crate) fn at_random(&self, design: &Design, options: &ChooseOptions<'_>) -> Option<Proposal> {
         let mut pool = self.pool(design, options);
         let mut ways = 0;
@@ -173,7 +173,7 @@ impl Chooser<'_> {
         proposals(&pool, design, &[found]).pop()
     }
 
-    /// Views at random that are wholly in the image, with what they are expected to say.
+    /// Random views that are wholly in the image, with their expected information.
     fn pool(&self, design: &Design, options: &ChooseOptions<'_>) -> Vec<Candidate> {
         let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
         let (intrinsics, target) = (self.model.intrinsics(), self.target);
@@ -203,7 +203,8 @@ impl Chooser<'_> {
         pool
     }
 
-    /// How the arm stands there, where that matters to what a view says; `None` where an arm that is not driven does not get there.
+    /// The posture of the arm there, where the information of a view depends on it; `None` where an arm that is not driven does not
+    /// get there.
     fn posture(&self, base_from_tip: Pose<Base, Tip>) -> Option<Posture> {
         let tip_from_joints = match (self.robot, self.reach) {
             (Some(robot), _) if self.model.has_arm() => robot.arm.tip_from_joints(&base_from_tip, &robot.joints),
@@ -213,7 +214,7 @@ impl Chooser<'_> {
         Some(Posture { base_from_tip, tip_from_joints })
     }
 
-    /// Not where a view failed, and not turned too far from all views so far.
+    /// Whether a pose is wanted: not where a view failed, and not turned too far from all views so far.
     fn is_wanted(&self, base_from_tip: &Pose<Base, Tip>, options: &ChooseOptions<'_>) -> bool {
         let failed = |pose: &Pose<Base, Tip>| {
             let (m, rad) = pose.distance_to(base_from_tip);
@@ -224,7 +225,7 @@ impl Chooser<'_> {
         !options.failed.iter().any(failed) && (self.taken.is_empty() || nearest <= options.turn_rad)
     }
 
-    /// The candidate after which the error is least, less than a limit, that the arm gets to and that is not in the plan.
+    /// The candidate after which the error is least, less than a limit, that the arm reaches and that is not in the plan.
     fn best(
         &self,
         pool: &mut [Candidate],
@@ -244,7 +245,7 @@ impl Chooser<'_> {
         ranking.into_iter().map(|(_, k)| k).find(|&k| self.way(&mut pool[k], ways).is_some())
     }
 
-    /// The joint values at a candidate and how long it takes there, if the arm gets to it.
+    /// The joint values at a candidate and the travel time, if the arm reaches it.
     fn way(&self, candidate: &mut Candidate, ways: &mut usize) -> Option<(Option<JointValues>, f64)> {
         if self.cancel.is_cancelled() {
             return None;
@@ -285,7 +286,8 @@ impl Chooser<'_> {
     }
 
     /// The view to begin with: of the plan the one that gains most over the square root of its time, on a free path; where none
-    /// has a free path, the best of all others that has. By the second alone, short ways to views that say little come first.
+    /// has a free path, the best of all others that has one. With gain per second alone, short moves to views with little
+    /// information would come first.
     fn first(
         &self,
         pool: &mut [Candidate],
@@ -334,31 +336,31 @@ impl Robot {
         }
     }
 
-    /// Whether the arm touches nothing with these joint values, at which its tip is there, and is not between camera and board.
+    /// Whether the arm touches nothing with these joint values, which put its tip there, and is not between camera and board.
     pub(crate) fn is_good(&self, joints: &JointValues, base_from_tip: &Pose<Base, Tip>) -> bool {
         let sees = |sight: &Sight| sight.is_free(&self.arm, joints, base_from_tip);
         self.arm.is_free(joints, &self.around, self.clearance_m) && self.sight.as_ref().is_none_or(sees)
     }
 
-    /// Whether the arm can be driven there on a straight path in joint space without touching anything. What it is nearer to than
-    /// allowed where it stands it may go away from: the arm is there, and where the camera sits is an estimate that can be off
-    /// by centimetres after the first turns.
+    /// Whether the arm can be driven there on a straight path in joint space without touching anything. It may move away from
+    /// what it is closer to than allowed at its present place: the arm is there, and the pose of the camera is an estimate that
+    /// can be off by centimetres after the first turns.
     pub(crate) fn path_is_free(&self, joints: &JointValues) -> bool {
         let guard = Guard::from(&self.arm, &self.around, &self.joints, self.clearance_m);
         guard.contact_on_path(&self.joints, joints).is_none()
     }
 
-    /// How long the arm takes from one configuration to another: up to speed, along, and down again, by the joint that has
-    /// the longest way, within the limits of what stands around. Limits of jerk are not in it.
+    /// Travel time of the arm from one configuration to another: acceleration, constant speed and deceleration of the
+    /// joint with the longest motion, within the limits of the surroundings. Limits of jerk are not included.
     pub fn travel_s(&self, from: &JointValues, to: &JointValues) -> f64 {
         let speed = self.arm.joint_speed(from, to, &self.around, self.pace.speed);
         Pace { speed, ..self.pace }.duration_s(travel(from, to))
     }
 }
 
-/// The arm with what is on its tip, the camera or the board, where the estimate has it; and the other one of the two among
-/// what stands around, with some room about the board wherever it is, and about a camera beside the robot; with the line of
-/// sight between them.
+/// The arm with the camera or the board on its tip, at the estimated pose; and the other one of the two among the
+/// obstacles, with a margin around the board in both cases, and around a camera next to the robot; with the line of sight
+/// between them.
 pub(super) fn with_board(robot: &Robot, hand_eye: &HandEye, observations: &Observations, room_m: f64) -> Robot {
     let mut robot = robot.clone();
     let target = &observations.target;

@@ -2,9 +2,9 @@
 //!
 //! The criterion is the trace of the covariance of a measured point, averaged over the box where the tool works:
 //! `tr(W C)` with `C` the covariance of the hand-eye transform and `W = Σ w_p J_pᵀ J_p` over points `p` of the box, where
-//! `J_p` is how the point moves with the transform. With an arm whose errors are among the unknowns it is the covariance of the
-//! distance from the tip of a tool to such a point, by corrected commands, which turns with those errors too. A view with the rows
-//! `R` changes the covariance of all unknowns to `C − C Rᵀ (1 + R C Rᵀ)⁻¹ R C`.
+//! `J_p` is the Jacobian of the point by the transform. With an arm whose errors are among the unknowns it is the covariance of
+//! the distance from the tip of a tool to such a point, by corrected commands, which depends on those errors too. A view with the
+//! rows `R` changes the covariance of all unknowns to `C − C Rᵀ (1 + R C Rᵀ)⁻¹ R C`.
 //!
 //! # Reference
 //! Fedorov 1972, "Theory of optimal experiments" (linear criteria, one view in and out); Woodbury 1950 for the update.
@@ -15,31 +15,31 @@ use handeye_estimate::handeye::joint::ExpectedView;
 use handeye_geometry::point_error;
 use handeye_geometry::targets::TargetSpec;
 
-/// What views say of the unknowns, and what is asked of them.
+/// The information of views on the unknowns, and the criterion for them.
 #[derive(Debug, Clone)]
 pub struct Design {
     covariance: DMatrix<f64>,
     weight: Weight,
 }
 
-/// `W`, of the unknowns that count.
+/// `W`, over the unknowns that count.
 #[derive(Debug, Clone)]
 pub struct Weight {
-    /// Which they are: the hand-eye transform, and the errors of the arm where they are asked for.
+    /// Their places: the hand-eye transform, and the errors of the arm where these are in the criterion.
     places: Vec<usize>,
     of: DMatrix<f64>,
 }
 
 impl From<Matrix6<f64>> for Weight {
-    /// Of the hand-eye transform alone.
+    /// The weight of the hand-eye transform alone.
     fn from(of: Matrix6<f64>) -> Self {
         Self { places: (0..6).collect(), of: DMatrix::from_iterator(6, 6, of.iter().copied()) }
     }
 }
 
 impl Weight {
-    /// Of a tool that is sent to a point, see [`Reach::weight`](handeye_estimate::reach_error::Reach::weight), with the hand-eye
-    /// transform and the errors of the arm in these places.
+    /// The weight of a tool that is sent to a point, see [`Reach::weight`](handeye_estimate::reach_error::Reach::weight), with
+    /// the hand-eye transform and the errors of the arm in these places.
     pub(crate) fn of_reach(places: impl Iterator<Item = usize>, of: DMatrix<f64>) -> Self {
         Self { places: places.collect(), of }
     }
@@ -50,19 +50,19 @@ impl Weight {
     }
 }
 
-/// What of the answer a view tells most of.
+/// The part of the answer that a view determines most.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
-    /// Where the camera is.
+    /// Position of the camera.
     Position,
-    /// How it is turned.
+    /// Orientation of the camera.
     Rotation,
     /// The errors of the arm.
     Arm,
 }
 
-/// `W` over a cube as large as the target about a point in camera coordinates \[m\]: its corners and its middle, each counting
-/// alike.
+/// `W` over a cube as large as the target around a point in camera coordinates \[m\]: its corners and its middle, with equal
+/// weights.
 pub fn weight_about(middle: &Point3<f64>, target: &TargetSpec) -> Matrix6<f64> {
     let half_m = 0.5 * target.extent().max();
     let signs = [-half_m, half_m];
@@ -71,14 +71,14 @@ pub fn weight_about(middle: &Point3<f64>, target: &TargetSpec) -> Matrix6<f64> {
     weight_over(&points)
 }
 
-/// `W` over points in camera coordinates \[m\], each counting alike.
+/// `W` over points in camera coordinates \[m\], with equal weights.
 pub(crate) fn weight_over(points: &[Point3<f64>]) -> Matrix6<f64> {
     let sum: Matrix6<f64> = points.iter().map(point_error::by_hand_eye).map(|j| j.tr_mul(&j)).sum();
     sum / points.len().max(1) as f64
 }
 
 impl Design {
-    /// Of what is known beforehand and some views; `None` where that leaves an unknown free.
+    /// The design by prior knowledge and some views; `None` where that leaves an unknown free.
     pub fn new<'a>(
         prior: DMatrix<f64>,
         views: impl IntoIterator<Item = &'a ExpectedView>,
@@ -108,7 +108,7 @@ impl Design {
         (self.mean_square() - self.taken_by(view)).max(0.0).sqrt()
     }
 
-    /// With one more view.
+    /// The design with one more view.
     #[must_use]
     pub fn with(&self, view: &ExpectedView) -> Self {
         let rows = view.rows();
@@ -120,7 +120,7 @@ impl Design {
         self.clone()
     }
 
-    /// Of the diagonal parts of the criterion the one that lost most since `before`; what two of them have in common is in none.
+    /// Of the diagonal parts of the criterion the one that lost most since `before`; cross terms are in none.
     pub(crate) fn part_of_gain(&self, before: &Self) -> Part {
         let gain = |places: std::ops::Range<usize>| {
             let of = |design: &Self| {
@@ -140,7 +140,7 @@ impl Design {
         self.weight.mean_square(&self.covariance)
     }
 
-    /// By how much a view lowers the mean square.
+    /// Decrease of the mean square by a view.
     fn taken_by(&self, view: &ExpectedView) -> f64 {
         let rows = view.rows();
         let through = rows * &self.covariance;

@@ -1,22 +1,22 @@
-//! The first few poses, from one view of the board, when nothing is known of where the camera sits: turns of the tip about
-//! its own axes, so small that the board stays in the image and the arm hardly moves.
+//! The first few poses, from one view of the board, when the place of the camera is unknown: turns of the tip about its
+//! own axes, small enough that the board stays in the image and the arm hardly moves.
 //!
 //! A turn of the tip by an angle turns what is fixed to it by the same angle. It shifts the image by about the focal length
-//! times that angle and by the lever between tip and camera (or board), which is taken to be no longer than the board is
-//! away. Turns about two axes are what a first estimate needs.
+//! times that angle and by the lever between tip and camera (or board), which is assumed to be no longer than the distance
+//! of the board. Turns about two axes are what a first estimate needs.
 
 use nalgebra::{Unit, UnitQuaternion, Vector2, Vector3};
 
 use handeye_geometry::frames::{Base, Pose, Tip};
 
-/// Largest turn: more than ten times what corners and robot err by, and a camera a hand's breadth from the tip moves by
-/// less than 3 cm.
+/// Largest turn: more than ten times the errors of corners and robot, and a camera a hand's breadth from the tip moves
+/// by less than 3 cm.
 const LARGEST_RAD: f64 = 14.0 * std::f64::consts::PI / 180.0;
-/// Least turn that is worth a capture.
+/// Smallest turn that is worth a capture.
 const LEAST_RAD: f64 = 1.0 * std::f64::consts::PI / 180.0;
 /// Part of the room in the image that a turn may use: the lever may use as much again.
 const PART: f64 = 0.45;
-/// By which the turns grow when it begins again.
+/// Factor by which the turns grow when it begins again.
 const LARGER: f64 = 1.4;
 /// Axes of the tip in the order in which it is turned about them.
 const TURNS: [[f64; 3]; 8] = [
@@ -30,8 +30,7 @@ const TURNS: [[f64; 3]; 8] = [
     [-0.6, -0.6, -0.529],
 ];
 
-/// How far the tip may be turned so that corners which are there now stay in the image, radians, for a focal length in
-/// pixels.
+/// Largest turn of the tip for which the present corners stay in the image, radians, for a focal length in pixels.
 pub(crate) fn free_turn_rad(
     corners_px: impl Iterator<Item = Vector2<f64>>,
     image_size: (u32, u32),
@@ -68,7 +67,7 @@ mod tests {
         let turn = |half| free_turn_rad(around(half), (640, 480), 600.0);
         assert!(turn(200.0) < 0.5 * turn(100.0));
         assert!(turn(239.0) >= LEAST_RAD && turn(10.0) <= LARGEST_RAD);
-        // What it uses of the room is less than half of it.
+        // It uses less than half of the room.
         assert!(turn(200.0) * 600.0 < 0.5 * 40.0);
     }
 

@@ -9,7 +9,7 @@ use handeye_wording::text;
 pub enum Hold {
     /// Fewer than [`LEAST_VIEWS`] views.
     FewViews,
-    /// What was found speaks against the answer.
+    /// The findings contradict the answer.
     Doubted,
     /// The upper 80 % limit of the noise levels gives an error above the goal, metres.
     NoiseLevels {
@@ -21,7 +21,7 @@ pub enum Hold {
 }
 
 impl Hold {
-    /// For people.
+    /// The reason in words.
     pub fn text(&self) -> Text {
         match self {
             Self::FewViews => text!(
@@ -44,12 +44,12 @@ impl Hold {
 }
 
 impl Guide {
-    /// Why it goes on below the goal, as of the last [`Guide::next`]; `None` where the expected error is not below it.
+    /// Why it goes on below the goal, at the last [`Guide::next`]; `None` where the expected error is not below it.
     pub fn hold(&self) -> Option<Hold> {
         self.hold
     }
 
-    /// The same of an answer with so many views.
+    /// The same for an answer with this many views.
     pub(super) fn hold_of(&self, known: &Known<'_>, views: usize) -> Option<Hold> {
         let (error, goal_m) = (self.judged?, self.options.goal_m);
         if error.promised.error_m > goal_m {

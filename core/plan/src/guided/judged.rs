@@ -1,4 +1,4 @@
-//! The error that the goal of a guided session is asked of.
+//! The error that the goal of a guided session refers to.
 
 use nalgebra::Matrix3;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
@@ -9,20 +9,20 @@ use handeye_estimate::handeye::joint::SmallSample;
 use handeye_estimate::uncertainty::quality::TipBox;
 use handeye_geometry::point_error;
 
-/// The error of an answer as its goal is asked of it.
+/// The error of an answer to which its goal refers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JudgedError {
-    /// What is stated.
+    /// The stated error.
     pub promised: Promised,
     /// The same at the upper limit of the noise levels, metres.
     pub at_upper_levels_m: f64,
-    /// In which box; `None` where the camera saw the board.
+    /// The box in which it holds; `None` for the place where the camera saw the board.
     pub tool_box: Option<TipBox>,
 }
 
 impl JudgedError {
-    /// Of an answer, for a goal \[m\]: where the camera saw the board, or at the worst point of a box. `None` where nothing may be
-    /// stated.
+    /// The error of an answer, for a goal \[m\]: where the camera saw the board, or at the worst point of a box. `None` where
+    /// nothing may be stated.
     pub(crate) fn of(calibration: &Calibration, goal_m: f64, tool_box: Option<&TipBox>) -> Option<Self> {
         let promised = calibration.promised(goal_m, tool_box)?;
         let joint = calibration.joint.as_ref()?;
@@ -35,13 +35,13 @@ impl JudgedError {
             })?;
             return Some(Self { promised, at_upper_levels_m, tool_box: tool_box.copied() });
         }
-        // What follows from a stated accuracy has no level that is estimated.
+        // An error by a stated accuracy has no estimated level.
         let (law, known_m) = match promised.of {
             Promise::ReachByAccuracy => (joint.small_sample, promised.least_m),
             _ => (calibration.arm()?.small_sample, 0.0),
         };
         let freedom = law.degrees_of_freedom;
-        // That the levels may be larger is a part of what is stated.
+        // The stated error includes that the levels may be larger.
         let law = SmallSample { degrees_of_freedom: freedom, ..SmallSample::KNOWN };
         let stated = law.radius_95(&Matrix3::identity()) / SmallSample::KNOWN.radius_95(&Matrix3::identity());
         let times = (upper_level(freedom) / stated).max(1.0);
@@ -49,7 +49,7 @@ impl JudgedError {
         Some(Self { promised, at_upper_levels_m: known_m.hypot(estimated_m * times), tool_box: tool_box.copied() })
     }
 
-    /// By which part of what it is now that which views lower has to become for the goal; `None` where no view gets there.
+    /// Ratio by which the part of the error that views lower has to shrink for the goal; `None` where no view gets there.
     pub(crate) fn ratio_to(&self, goal_m: f64) -> Option<f64> {
         let above = |error_m: f64| error_m * error_m - self.promised.least_m * self.promised.least_m;
         let (goal, now) = (above(goal_m), above(self.at_upper_levels_m));
@@ -57,7 +57,7 @@ impl JudgedError {
     }
 }
 
-/// The upper limit of a noise level over its estimate from so many numbers.
+/// The upper limit of a noise level over its estimate with this many degrees of freedom.
 pub(super) fn upper_level(degrees_of_freedom: f64) -> f64 {
     match ChiSquared::new(degrees_of_freedom) {
         Ok(chi) if degrees_of_freedom.is_finite() => {
@@ -80,7 +80,8 @@ mod tests {
 
     use super::*;
 
-    /// A robot of which the accuracy alone is known is judged by that, at the board and in a box before a camera beside it.
+    /// A robot of which only the accuracy is known is judged by that, at the board and in a box in front of a camera next
+    /// to it.
     #[test]
     fn what_follows_from_a_stated_accuracy_is_no_part_of_what_noise_levels_may_make_larger() {
         let noise = Noise { corner_px: 0.1, robot_m: 2e-5, robot_rad: 1e-4, ..Noise::EXACT };
@@ -93,7 +94,8 @@ mod tests {
             let judged = JudgedError::of(&calibration, 3e-4, None).expect("a reach");
             let Promised { error_m, least_m, of } = judged.promised;
             assert_eq!(of, Promise::ReachByAccuracy, "{mode:?}");
-            // The noise levels of twelve views may be larger by less than half, and no more than that of what rests on them.
+            // The noise levels of twelve views may be larger by less than half, and so may the part of the error that rests
+            // on them.
             let [stated, upper] = [error_m, judged.at_upper_levels_m].map(|m| m.powi(2) - least_m.powi(2));
             assert!(stated <= upper * (1.0 + 1e-9) && upper < 2.25 * stated, "{stated} {upper} {judged:?}");
             assert!(least_m > 3e-4 && judged.ratio_to(3e-4).is_none(), "no view gets there: {judged:?}");
@@ -111,7 +113,7 @@ mod tests {
     fn what_no_view_lowers_is_no_part_of_what_has_to_become_less() {
         let promised = Promised { error_m: 5e-4, least_m: 3e-4, of: Promise::ReachCorrected };
         let judged = JudgedError { promised, at_upper_levels_m: 5e-4, tool_box: None };
-        // 0.4 mm beside it, of which a goal of 0.36 mm leaves 0.2.
+        // In addition 0.4 mm, of which a goal of 0.36 mm leaves 0.2.
         let ratio = judged.ratio_to((9e-8_f64 + 4e-8).sqrt()).expect("within reach");
         assert!((ratio - 0.5).abs() < 1e-12, "{ratio}");
         assert_eq!(judged.ratio_to(6e-4), Some(1.0));

@@ -1,19 +1,19 @@
-//! Calibration that chooses its own poses: from one view of the board to the accuracy that was asked for.
+//! Calibration that chooses its own poses: from one view of the board to the requested accuracy.
 //!
 //! # How
 //! Before there is a first estimate the tip is turned a little about its own axes ([`fan`]). From then on every view is the
 //! one of many possible ones that lowers the expected error of the tip over a box most for its travel ([`choose`]),
 //! by the same information matrix as the estimate ([`ViewModel`]). A view is possible where the whole board is in the image
-//! in spite of what is not known yet, so moves are small at first and grow with what is known.
+//! in spite of the uncertainty, so moves are small at first and grow as it shrinks.
 //!
 //! # When it ends
-//! See [`Ending`]. The error is what the calibration promises ([`Calibration::promised`]): how near a tool arrives where the arm is
-//! known, else that of a measured point. It counts at the upper 80 % limit of the noise levels: an end that waits for a small
-//! estimate prefers estimates that happen to be small.
+//! See [`Ending`]. The error is the one that the calibration promises ([`Calibration::promised`]): how near a tool arrives where
+//! the arm is known, else that of a measured point. It counts at the upper 80 % limit of the noise levels: an end that waits for a
+//! small estimate prefers estimates that happen to be small.
 //!
 //! # Degenerate cases
-//! A session whose views determine nothing goes on with the fan. Where the arm or its joints are not known, its errors are not among
-//! what a view is expected to tell.
+//! A session whose views do not determine an answer goes on with the fan. Where the arm or its joints are not known, its errors are
+//! not part of the expected information of a view.
 
 pub mod by_hand;
 pub mod candidates;
@@ -46,64 +46,64 @@ use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::TargetSpec;
 
-/// Views from which on an end is possible: from as many on errors of the robot that depend on where it stands are looked for,
-/// and with fewer the noise levels are hardly known.
+/// Views from which on an end is possible: from this number on pose-dependent errors of the robot are tested for, and with
+/// fewer the noise levels are hardly known.
 pub const LEAST_VIEWS: usize = FIELD_VIEWS;
-/// Gain of the best view \[part of the error\] below which more views are not worth their time.
+/// Gain of the best view \[fraction of the error\] below which more views are not worth their time.
 pub(crate) const LEAST_GAIN: f64 = 0.03;
-/// Captures that check the answer afterwards, where nobody says how many.
+/// Captures that check the answer afterwards, where no number is given.
 pub const CHECKS: usize = 3;
-/// Part of the goal by which explanations that the answer does not count on may move it.
+/// Part of the goal by which explanations that the answer does not account for may move it.
 const SMALL_PART: f64 = 0.1;
-/// Solves in a row in which the error has to be below the goal.
+/// Consecutive solutions whose error has to be below the goal.
 const IN_A_ROW: usize = 2;
-/// Probability that the noise levels are below what the end is judged by.
+/// Probability that the noise levels are below the limit that the end is judged by.
 const LEVEL_SURE: f64 = 0.8;
-/// How far the tip turns from the nearest view so far, per view there is: a first estimate from small turns is not trusted
+/// Largest turn of the tip from the nearest view so far, per view taken: a first estimate from small turns is not trusted
 /// with large ones. From six views on there is no limit.
 const TURN_PER_VIEW_RAD: f64 = 40.0 * std::f64::consts::PI / 180.0;
-/// Views with a limit of that.
+/// Number of views with that limit.
 const CAREFUL_VIEWS: usize = 6;
-/// Part of that which is left after each pose that somebody leaves out.
+/// Factor on that limit after each pose that a person skips.
 const NEARER_PER_SKIP: f64 = 0.7;
-/// And what is left of it at the end: less is hardly another view.
+/// And its least value: a smaller turn is hardly another view.
 const LEAST_TURN_RAD: f64 = 15.0 * std::f64::consts::PI / 180.0;
-/// Further free space around the board, metres, while there are fewer views than that: it is not where it is taken to be.
+/// Additional clearance around the board, metres, while there are fewer views than that: its place is uncertain.
 const CAREFUL_ROOM_M: f64 = 0.03;
-/// Largest way of a joint to a pose of the fan, radians: more is another configuration, not a small turn.
+/// Largest motion of a joint to a pose of the fan, radians: more is another configuration, not a small turn.
 const LARGEST_FAN_WAY_RAD: f64 = 0.8;
 /// Poses in a row without a view after which it ends.
 const MOST_FAILURES: usize = 5;
-/// Poses of the fan that are tried before it is given up.
+/// Poses of the fan that are tried before giving up.
 const MOST_FAN: usize = 24;
-/// Views at random among which a check finds one that the arm gets to.
+/// Random views among which a check finds one that the arm reaches.
 const CHECK_CANDIDATES: usize = 200;
-/// Noise levels below which a plan does not reckon: far below those of any robot and any camera.
+/// Least noise levels that a plan assumes: far below those of any robot and any camera.
 const LEAST_NOISE: Noise = Noise { corner_px: 2e-3, robot_m: 2e-6, robot_rad: 5e-6, ..Noise::EXACT };
-/// The same while there are few views: what they say of the levels may be nothing.
+/// The same while there are few views: they may not determine the levels at all.
 const CAREFUL_NOISE: Noise = Noise { corner_px: 0.02, robot_m: 2e-5, robot_rad: 5e-5, ..Noise::EXACT };
 
-/// What is asked for.
+/// Options of a guided session.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GuidedOptions {
     /// The 95 % error that is to be reached, metres, see [`Calibration::promised`].
     pub goal_m: f64,
-    /// Views after which the session ends, goal or not.
+    /// Views after which the session ends, whether or not the goal is reached.
     pub most_views: usize,
-    /// Time at the most, seconds.
+    /// Longest time, seconds.
     pub most_s: f64,
-    /// Gain of the best view, part of the error, below which it ends: see [`LEAST_GAIN`].
+    /// Gain of the best view, as a fraction of the error, below which it ends: see [`LEAST_GAIN`].
     pub least_gain: f64,
     /// Views that are compared at every step.
     pub candidates: usize,
     /// Views that are planned ahead.
     pub ahead: usize,
-    /// What a capture takes after the arm has arrived, seconds.
+    /// Duration of a capture after the arm has arrived, seconds.
     pub dwell_s: f64,
     /// Seed of everything random.
     pub seed: u64,
-    /// Where the tool works: the goal holds for the worst point of it, and views are chosen by the mean square over it. Where the
-    /// camera saw the board, and over a cube as large as the board about that, without one.
+    /// Where the tool works: the goal holds for the worst point of it, and views are chosen by the mean square over it. Without
+    /// one the place where the camera saw the board, and a cube as large as the board around it.
     pub tool_box: Option<TipBox>,
 }
 
@@ -123,16 +123,16 @@ impl Default for GuidedOptions {
     }
 }
 
-/// What is known when the next pose is asked for.
+/// What is known when the next pose is requested.
 #[derive(Debug, Clone, Copy)]
 pub struct Known<'a> {
     /// All views so far.
     pub observations: &'a Observations,
-    /// What they give; `None` while they do not determine an answer.
+    /// Their calibration; `None` while they do not determine one.
     pub calibration: Option<&'a Calibration>,
     /// The arm; `None` where its chain is not known, and where it is not driven.
     pub robot: Option<&'a Robot>,
-    /// Since the beginning, seconds.
+    /// Time since the beginning, seconds.
     pub elapsed_s: f64,
 }
 
@@ -142,38 +142,39 @@ impl<'a> Known<'a> {
     }
 }
 
-/// What comes next.
+/// The next step.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Next {
-    /// The first of these views, and then ask again.
+    /// Take the first of these views, then call again.
     Go {
         /// The views that are planned.
         plan: Plan,
-        /// Why the first.
+        /// Why the first one is proposed.
         why: Why,
     },
-    /// Nothing.
+    /// The session ends.
     End(Ending),
 }
 
 /// Why a pose is proposed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Why {
-    /// A small turn about an axis of the tip, because nothing is known of where the camera sits. Radians.
+    /// A small turn about an axis of the tip, because the place of the camera is unknown.
     FirstTurns {
         /// Angle of the turn, radians.
         turn_rad: f64,
     },
-    /// A tilt of the camera about the board by a rough answer, because the small turns determine none. Radians.
+    /// A tilt of the camera about the board by a rough answer, because the small turns do not determine the
+    /// calibration.
     FirstTilts {
         /// The tilt, from the first view.
         turn_rad: f64,
     },
-    /// What it lowers the error from and to, metres, and in what most.
+    /// Its effect on the error, metres, and the part that it lowers most.
     Gain {
         /// The 95 % error now: of a point by the noise alone, or of a tool by corrected commands.
         from_m: f64,
-        /// The same with it.
+        /// The same with the new view.
         to_m: f64,
         /// See [`Proposal::part`].
         part: Part,
@@ -185,76 +186,76 @@ pub enum Why {
 pub enum Ending {
     /// The error is below the goal.
     GoalReached {
-        /// What is stated.
+        /// The stated error.
         promised: Promised,
     },
     /// The best view would lower the error by less than [`GuidedOptions::least_gain`].
     LittleToGain {
-        /// By what part of it.
+        /// Fraction of the error.
         gain: f64,
     },
-    /// More views lower the error no further, or there are as many as allowed, and what no view lowers is above the goal: what the arm
-    /// does not repeat, and what it is off where no commands are corrected.
+    /// More views lower the error no further, or there are as many as allowed, and the part that no view lowers is above the goal:
+    /// the repeatability of the arm, and its errors where no commands are corrected.
     Repeatability {
-        /// What is stated, and what of it no view lowers.
+        /// The stated error, with the part that no view lowers.
         promised: Promised,
     },
-    /// As many views as allowed.
+    /// The largest number of views is reached.
     MostViews,
-    /// As much time as allowed.
+    /// The longest time is reached.
     MostTime,
-    /// The arm touches something where it stands, as far as is known: it cannot be driven away safely.
+    /// By what is known the arm touches something at its present place: it cannot be moved away safely.
     StartBlocked {
-        /// What it is too near to.
+        /// What it is too close to.
         by: Contact,
     },
-    /// The board was not seen from any of the first turns, or they determine nothing.
+    /// The board was not seen from any of the first turns, or they do not determine an answer.
     NoStart,
-    /// So many poses in a row gave no view of the board.
+    /// This many poses in a row gave no view of the board.
     BoardLost {
-        /// How many.
+        /// Number of poses.
         poses: usize,
     },
     /// There was an answer, and there is none now.
     AnswerLost,
-    /// The best view would gain little, and what was found speaks against the answer.
+    /// The best view would gain little, and the findings contradict the answer.
     Doubted,
-    /// No view that would tell something can be reached.
+    /// No view with any information can be reached.
     NothingInReach {
-        /// Views that were compared.
+        /// Number of views that were compared.
         candidates: usize,
     },
 }
 
-/// A pose that was proposed, and what came of it.
+/// A pose that was proposed, and its outcome.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
-    /// Where the tip was to go.
+    /// The pose of the tip.
     pub base_from_tip: Pose<Base, Tip>,
     /// The joint values there; `None` for an arm whose chain is not known.
     pub joints: Option<JointValues>,
-    /// What the step is for.
+    /// Why it was proposed.
     pub why: Why,
-    /// The 95 % error after it, as that of [`Why::Gain`], metres; `None` until there is one.
+    /// The 95 % error after it, of the same kind as in [`Why::Gain`], metres; `None` until there is one.
     pub achieved_m: Option<f64>,
-    /// How long the arm was to be on its way, seconds.
+    /// Planned travel time of the arm, seconds.
     pub travel_s: f64,
-    /// Views that were compared.
+    /// Number of views that were compared.
     pub candidates: usize,
-    /// What came of it.
+    /// Its outcome.
     pub outcome: Outcome,
 }
 
-/// What came of a pose.
+/// The outcome of a pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     /// Not known yet.
     Pending,
-    /// A view.
+    /// A view was captured.
     Captured,
     /// No view: no board, blurred, not reached.
     Failed,
-    /// Somebody left it out.
+    /// A person skipped it.
     Skipped,
 }
 
@@ -275,10 +276,11 @@ pub struct Guide {
     tilts_tried: usize,
     below: usize,
     solved_views: usize,
-    /// Where the board was when the first choice was made: what a person chose, not the guide.
+    /// Range of views by the poses of the board when the first choice was made: those were chosen by a person, not by
+    /// the guide.
     range: Option<ViewRange>,
     failures: usize,
-    /// Views that somebody left out, one less for each that was taken.
+    /// Views that a person skipped, minus one for each that was taken.
     skips: usize,
     steps: Vec<Step>,
     hold: Option<Hold>,
@@ -287,7 +289,7 @@ pub struct Guide {
 }
 
 impl Guide {
-    /// Nothing is captured yet.
+    /// A guide without captures yet.
     pub fn new(options: GuidedOptions) -> Self {
         Self {
             options,
@@ -306,23 +308,23 @@ impl Guide {
         }
     }
 
-    /// What is asked for.
+    /// The options.
     pub fn options(&self) -> &GuidedOptions {
         &self.options
     }
 
-    /// Where the tool works from now on, see [`GuidedOptions::tool_box`]: what stays in its place in the base is elsewhere in the
-    /// camera with every answer.
+    /// Where the tool works from now on, see [`GuidedOptions::tool_box`]: a box that is fixed in the base has another place in
+    /// the camera with every answer.
     pub fn work_in(&mut self, tool_box: Option<TipBox>) {
         self.options.tool_box = tool_box;
     }
 
-    /// Every pose that was proposed, and what came of it.
+    /// Every pose that was proposed, and its outcome.
     pub fn steps(&self) -> &[Step] {
         &self.steps
     }
 
-    /// The error that the goal was asked of last; `None` where none may be stated.
+    /// The error that the goal last referred to; `None` where none may be stated.
     pub fn judged(&self) -> Option<&JudgedError> {
         self.judged.as_ref()
     }
@@ -341,8 +343,8 @@ impl Guide {
         self.failures += 1;
     }
 
-    /// Somebody leaves out the pose proposed last: it is not proposed again, nor its neighbourhood, and says nothing of
-    /// whether the board is lost. The next ones are nearer to where the arm has been.
+    /// A person skips the pose proposed last: it is not proposed again, nor its neighbourhood, and does not count as a
+    /// loss of the board. The next ones are nearer to where the arm has been.
     pub fn skipped(&mut self) {
         self.skips += 1;
         if let Some(step) = self.steps.last_mut() {
@@ -357,11 +359,11 @@ impl Guide {
             step.outcome = Outcome::Captured;
         }
         self.failures = 0;
-        // What kept a person from the others is still there.
+        // The reason why a person skipped the others still holds.
         self.skips = self.skips.saturating_sub(1);
     }
 
-    /// What to do next. Long work polls `cancel`; cancelled it returns an end or a shorter plan, which mean nothing.
+    /// What to do next. Long work polls `cancel`; cancelled it returns an end or a shorter plan, which are meaningless.
     pub fn next(&mut self, known: &Known<'_>, cancel: &CancelToken) -> Next {
         let used = used_views(known.observations, known.fit());
         let (goal_m, tool_box) = (self.options.goal_m, self.options.tool_box.as_ref());
@@ -371,7 +373,7 @@ impl Guide {
             step.achieved_m = achieved.map(|achieved| achieved.now_m);
             let last = known.observations.views.len().wrapping_sub(1);
             if known.calibration.is_some_and(|it| it.views.get(last).is_some_and(|v| v.status == ViewStatus::Outlier)) {
-                // It says nothing, and would be proposed again.
+                // It has no information, and would be proposed again.
                 self.failed.push(step.base_from_tip);
             }
         }
@@ -416,17 +418,18 @@ impl Guide {
         match self.plan(known, &model, used, cancel) {
             None => self.without_answer(known, cancel),
             Some((plan, lowered)) if plan.candidates > 0 => self.worthwhile(known, plan, lowered, used.len()),
-            // So little is known that no view is surely in the image: more of the first poses.
+            // The uncertainty is so large that no view is surely in the image: more of the first poses.
             Some(_) => self.first_poses(known, cancel),
         }
     }
 
-    /// The first turns are for before there is an answer: later the arm is elsewhere, and they are no small moves.
+    /// The first turns are only for the time before there is an answer: later the arm is elsewhere, and they are not
+    /// small moves.
     fn without_answer(&mut self, known: &Known<'_>, cancel: &CancelToken) -> Next {
         if self.range.is_some() { Next::End(Ending::AnswerLost) } else { self.first_poses(known, cancel) }
     }
 
-    /// The error as the goal is asked of it, where views are chosen by it: where commands can be corrected.
+    /// The error that the goal refers to, where views are chosen by it: where commands can be corrected.
     fn by_arm(&self, known: &Known<'_>) -> Option<&JudgedError> {
         let is_corrected = known.calibration?.reach_errors()?.corrected_95_m.is_some();
         self.judged.as_ref().filter(|judged| judged.promised.of != Promise::Point && is_corrected)
@@ -440,7 +443,7 @@ impl Guide {
     }
 
     /// The 95 % error that is expected with this part left of what views lower, see [`Proposal::error_ratio`], metres, after
-    /// [`Self::next`], and what it is of: of a point it is that by the noise alone.
+    /// [`Self::next`], and its kind: for a point it is that by the noise alone.
     pub fn expected_m(&self, known: &Known<'_>, ratio: f64) -> Option<(f64, Promise)> {
         let of = self.by_arm(known).map_or(Promise::Point, |judged| judged.promised.of);
         Some((self.lowered(known)?.with_m(ratio), of))
@@ -455,7 +458,7 @@ impl Guide {
         Some(Lowered { now_m, least_m: 0.0 })
     }
 
-    /// The plan from an estimate, and what it lowers; `None` where the views so far determine nothing.
+    /// The plan from an estimate, and what it lowers; `None` where the views so far do not determine an answer.
     fn plan(
         &mut self,
         known: &Known<'_>,
@@ -487,8 +490,8 @@ impl Guide {
         Some((chooser.plan(&ground.design, &options), lowered))
     }
 
-    /// A pose that was not designed, to check the answer at: a view at random that the arm gets to. `index` counts the
-    /// checks, `skips` those that somebody left out. `None` where there is no answer, or no such view.
+    /// A pose that was not designed, to check the answer at: a random view that the arm reaches. `index` counts the
+    /// checks, `skips` those that a person skipped. `None` where there is no answer, or no such view.
     pub fn check_pose(&self, known: &Known<'_>, index: usize, skips: usize, cancel: &CancelToken) -> Option<Proposal> {
         let target = &known.observations.target;
         let model = self.model(known)?;
@@ -508,7 +511,7 @@ impl Guide {
         ground.chooser(&model, target).at_random(&ground.design, &options)
     }
 
-    /// What a choice stands on; `None` where the views so far determine nothing.
+    /// The basis of a choice; `None` where the views so far do not determine an answer.
     fn ground<'c>(
         &self,
         known: &Known<'c>,
@@ -538,13 +541,13 @@ impl Guide {
         Some(Ground { design, reach, range, robot, taken, cancel })
     }
 
-    /// What failed was expected to be in the image: the estimate is worse than it says.
+    /// The board was expected to be in the image of failed poses: the estimate is worse than stated.
     fn doubt_factor(&self) -> f64 {
         1.0 + self.failures as f64
     }
 
-    /// Whether nothing was found that speaks against the answer. An explanation that it does not count on, and that moves it by a
-    /// small part of the goal, is none that has to be resolved for this goal.
+    /// Whether no finding contradicts the answer. An explanation that it does not account for, and that moves it by a small part
+    /// of the goal, does not have to be resolved for this goal.
     fn is_sound(&self, calibration: Option<&Calibration>) -> bool {
         let Some(calibration) = calibration else { return false };
         match calibration.stated_uncertainty() {
@@ -564,7 +567,7 @@ impl Guide {
         };
         let limit = self.repeatability();
         let gain = 1.0 - lowered.with_m(plan.best_ratio) / lowered.now_m;
-        // Where no view leads to the goal it is the error as a whole that has to be worth one.
+        // Where no view leads to the goal the decrease of the whole error has to be worth a view.
         let worth = if limit.is_some() { gain } else { 1.0 - plan.best_ratio };
         if views >= LEAST_VIEWS && worth < self.options.least_gain {
             let reached = self.reached_after_all(known, views).or(limit);
@@ -575,14 +578,15 @@ impl Guide {
         Next::Go { plan, why }
     }
 
-    /// Where it ends for another reason than a small error: that was not waited for, and is as likely too small as too large.
+    /// For an end with another reason than a small error: the session did not wait for a small estimate, so the error is as
+    /// likely too small as too large.
     fn reached_after_all(&self, known: &Known<'_>, views: usize) -> Option<Ending> {
         let promised = self.judged.map(|judged| judged.promised)?;
         let is_below = views >= LEAST_VIEWS && promised.error_m <= self.options.goal_m;
         (is_below && self.is_sound(known.calibration)).then_some(Ending::GoalReached { promised })
     }
 
-    /// Where what no view lowers is above the goal.
+    /// The end where the part that no view lowers is above the goal.
     fn repeatability(&self) -> Option<Ending> {
         let promised = self.judged?.promised;
         (promised.least_m > self.options.goal_m).then_some(Ending::Repeatability { promised })
@@ -612,19 +616,19 @@ impl Guide {
 #[derive(Debug, Clone, Copy)]
 struct Lowered {
     now_m: f64,
-    /// What no view lowers it below.
+    /// The value below which no view lowers it.
     least_m: f64,
 }
 
 impl Lowered {
-    /// With this part left of what views lower.
+    /// The error with this fraction left of the part that views lower.
     fn with_m(&self, ratio: f64) -> f64 {
         let least = self.least_m.min(self.now_m).powi(2);
         (least + (self.now_m.powi(2) - least) * ratio * ratio).sqrt()
     }
 }
 
-/// What a choice stands on.
+/// The basis of a choice.
 struct Ground<'c> {
     design: Design,
     reach: Option<&'c Reach>,
@@ -648,18 +652,18 @@ impl Ground<'_> {
     }
 }
 
-/// How far the tip may turn from the nearest view so far, after so many more poses that somebody left out than took, radians:
-/// where the arm has been it gets to again.
+/// Largest turn of the tip from the nearest view so far, after this many more poses skipped than taken, radians: where the
+/// arm has been it can go again.
 fn turn_after(skips: usize) -> f64 {
     (std::f64::consts::PI * NEARER_PER_SKIP.powf(skips as f64)).max(LEAST_TURN_RAD)
 }
 
-/// How far the camera may be from where the estimate has it on its mount, 95 %, metres.
+/// Error of the camera's position on its mount, 95 %, metres.
 fn camera_unsure_m(calibration: &Calibration) -> f64 {
     calibration.modelled_error_95_at(&Point3::origin()).unwrap_or(f64::INFINITY)
 }
 
-/// The error by the noise alone where the goal is judged, metres.
+/// The error by the noise alone at the place where the goal is judged, metres.
 fn modelled_error_m(calibration: &Calibration, tool_box: Option<&TipBox>) -> Option<f64> {
     worst(calibration, tool_box, |point| calibration.modelled_error_95_at(point))
 }
@@ -698,7 +702,7 @@ fn used_views(observations: &Observations, fit: Option<&Fit>) -> Vec<UsedView> {
     observations.views.iter().enumerate().filter_map(of_view).collect()
 }
 
-/// What views that were taken say by a model.
+/// The information of views that were taken, by a model.
 fn expected_views(model: &ViewModel, used: &[UsedView]) -> Vec<ExpectedView> {
     used.iter().filter_map(|view| model.expected(&view.posture, &view.corners)).collect()
 }

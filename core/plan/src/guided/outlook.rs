@@ -1,25 +1,25 @@
-//! How many views there are still to take.
+//! How many views are still to be taken.
 
 use super::choose::Plan;
 use super::{Guide, IN_A_ROW, Known, LEAST_VIEWS, used_views};
 
 impl Guide {
     /// Views that are expected to lead to the goal, those that are planned first; 0 where it is reached. `None` where no error
-    /// may be stated, and where the goal takes more views than are allowed. Of the last [`Guide::next`].
+    /// may be stated, and where the goal takes more views than are allowed. Refers to the last [`Guide::next`].
     ///
-    /// Within the plan the error falls as the plan says, beyond it as the square root of the number of views. By the noise
-    /// levels as estimated now: with few views they may be off by half.
+    /// Within the plan the error falls as planned, beyond it with the square root of the number of views. The noise levels
+    /// are those estimated now: with few views they may be off by half.
     pub fn views_left(&self, known: &Known<'_>, plan: &Plan) -> Option<usize> {
         let ratio = self.judged?.ratio_to(self.options.goal_m)?;
         let views = used_views(known.observations, known.fit()).len();
         let by_error = if ratio >= 1.0 { 0 } else { views_to(ratio, views, plan)? };
-        // One answer that is good enough may be luck.
+        // One answer that is good enough may be chance.
         let left = by_error.max(LEAST_VIEWS.saturating_sub(views)) + IN_A_ROW - 1;
         (views + left <= self.options.most_views).then_some(left)
     }
 }
 
-/// Views until the error is this part of what it is.
+/// Views until the error is this fraction of the present one.
 fn views_to(ratio: f64, views: usize, plan: &Plan) -> Option<usize> {
     if let Some(index) = plan.proposals.iter().position(|proposal| proposal.error_ratio <= ratio) {
         return Some(index + 1);
@@ -27,7 +27,7 @@ fn views_to(ratio: f64, views: usize, plan: &Plan) -> Option<usize> {
     let last = plan.proposals.last()?.error_ratio;
     let planned = views + plan.proposals.len();
     let needed = (planned as f64 * (last / ratio).powi(2)).ceil();
-    // More than anybody takes is more than allowed.
+    // Such a large number is more than allowed in any case.
     (needed < 1e6).then(|| needed as usize - views)
 }
 

@@ -1,12 +1,12 @@
 //! Poses before there is an answer: small turns of the tip, then tilts of the camera about the board.
 //!
-//! The small turns ([`super::fan`]) need to know nothing. Where the board nearly fills the image, or lies near its edge, they are
-//! so small that they determine no lens. But with a lens that is guessed they give a rough answer, and by that the board can
-//! be tilted in the image without leaving it. Turns of the tip by an angle `a` move the board in the image by
-//! `f a (1 + l / z)`, where `l` is the lever from tip to camera along the line of sight, and `z`, the distance of the board, is
-//! `f` times what its pixels say. So whatever `f` is guessed, `l + z`, the place of the board before the tip, comes out right, and
-//! a tilt turns the tip about that place. What comes out wrong is where the camera sits: it is not what is kept clear of things,
-//! the camera at the tip still is.
+//! The small turns ([`super::fan`]) need no prior knowledge. Where the board nearly fills the image, or is near its edge, they are
+//! too small to determine a lens. But with a guessed lens they give a rough answer, with which the board can be tilted in the
+//! image without leaving it. Turns of the tip by an angle `a` move the board in the image by `f a (1 + l / z)`, where `l` is the
+//! lever from tip to camera along the line of sight, and `z`, the distance of the board, is `f` times the true size of the board
+//! over that in pixels. So whatever `f` is guessed, `l + z`, the place of the board in front of the tip, is correct, and a tilt
+//! turns the tip about that place. The place of the camera is wrong: it is not used for clearances, a camera at the tip is used
+//! instead.
 
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3};
 
@@ -27,26 +27,27 @@ use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::TargetSpec;
 use handeye_geometry::targets::observation::Corner;
 
-/// Views that a rough answer takes: the first one and turns about two axes.
+/// Views that a rough answer needs: the first one and turns about two axes.
 const ROUGH_VIEWS: usize = 3;
-/// Axes in the camera that it is tilted about, in their order, twice at the most.
+/// Axes in the camera that it is tilted about, in their order, at most twice.
 const AXES: [[f64; 3]; 6] =
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.7, 0.7, 0.0], [-0.7, -0.7, 0.0]];
-/// Tilts, degrees: of each axis the largest one that surely shows the board. An estimate of a lens takes 20° and more about two.
+/// Tilts, degrees: of each axis the largest one that surely shows the board. An estimate of a lens needs 20° and more about two.
 const TILTS_DEG: [f64; 4] = [28.0, 20.0, 14.0, 10.0];
 /// The tilt where none surely shows it, degrees, less after a view that did not.
 const UNSURE_TILT_DEG: f64 = 10.0;
-/// Distances from the board that a tilt is tried at, as parts of the first: what is tilted takes more room in the image.
+/// Distances from the board that a tilt is tried at, as parts of the first: a tilted board may need more room in the
+/// image.
 const DISTANCES: [f64; 4] = [1.0, 1.1, 1.25, 1.5];
 
-/// The first view, about which the others lie.
+/// The first view, around which the others are.
 struct FirstView<'o> {
     base_from_tip: Pose<Base, Tip>,
     corners: &'o [Corner],
 }
 
 impl Guide {
-    /// A pose that takes no answer: a small turn about the first view, or a tilt by a rough answer once there are some.
+    /// A pose that needs no answer: a small turn about the first view, or a tilt by a rough answer once there are some.
     pub(super) fn first_poses(&mut self, known: &Known<'_>, cancel: &CancelToken) -> Next {
         let observations = known.observations;
         let mut views = observations.views.iter().filter_map(|view| {
@@ -78,7 +79,7 @@ impl Guide {
         Next::End(Ending::NoStart)
     }
 
-    /// A tilt about the board; `None` where no rough answer is found, or all were tried.
+    /// A tilt about the board; `None` where no rough answer is found, or all tilts were tried.
     fn tilt(&mut self, known: &Known<'_>, first: &Pose<Base, Tip>, cancel: &CancelToken) -> Option<Next> {
         let rough = RoughAnswer::new(known, first, self.doubt_factor(), cancel)?;
         let left = self.tilts_tried..2 * AXES.len();
@@ -96,7 +97,7 @@ impl Guide {
     }
 }
 
-/// Where everything is by the views so far and a lens that is guessed.
+/// The geometry by the views so far and a guessed lens.
 struct RoughAnswer {
     model: ViewModel,
     target: TargetSpec,
@@ -132,8 +133,8 @@ impl RoughAnswer {
         Some(Self { model, target, design, range, seen_first, robot, doubt_factor })
     }
 
-    /// The camera tilted about the board, from the nearest distance from which that is in the image, surely or as far as is
-    /// known, and that the arm gets to.
+    /// The camera tilted about the board, from the nearest distance from which that is in the image, surely or by the
+    /// estimate, and that the arm reaches.
     fn tilted(&self, axis: [f64; 3], deg: f64, surely: bool) -> Option<Next> {
         let turn_rad = deg.to_radians();
         let about = UnitQuaternion::from_scaled_axis(Vector3::from(axis).normalize() * turn_rad);
@@ -178,7 +179,7 @@ fn about_board(
     Pose::from_isometry(turned * Translation3::from(-target.centre().coords))
 }
 
-/// Joint values by which the arm gets to a tip pose along a free way that is not long; `Some(None)` without an arm.
+/// Joint values with which the arm reaches a tip pose on a short free path; `Some(None)` without an arm.
 #[expect(
     clippy::option_option,
     reason = "the outer one says whether it is reached, the inner one whether there is an arm"

@@ -41,7 +41,7 @@ fn from_one_view_of_the_board_the_goal_is_reached_on_three_arms_with_the_camera_
     }
 }
 
-/// Links that are off as those of a usual arm whose controller has the data sheet.
+/// Link errors of a usual arm whose controller uses the data sheet.
 const LINKS: HiddenErrors = HiddenErrors { links: Some((1.2e-3, 2.5e-4)), ..HiddenErrors::NOTHING };
 /// A robot that repeats well.
 const PRECISE: Noise = Noise { robot_m: 2e-5, robot_rad: 4e-5, ..REALISTIC };
@@ -156,7 +156,7 @@ fn camera_at_the_base(seed: u64) -> Option<GuidedCell> {
     GuidedCell::placed(CellSetup::new(CellArm::Ur5e, Mode::EyeToHand, seed), places)
 }
 
-/// Whether a link other than the last is between the camera and a corner of the board, looked at point by point.
+/// Whether a link other than the last is between the camera and a corner of the board, checked point by point.
 fn is_hidden(cell: &GuidedCell, joints: &[f64]) -> bool {
     let chain = &cell.robot.arm.chain;
     let frames = chain.frames(joints).expect("its joints");
@@ -184,7 +184,7 @@ fn no_pose_is_proposed_with_the_arm_between_camera_and_board() {
     let (mut cells, mut poses) = (0, 0);
     for cell in (0..60).filter_map(camera_at_the_base) {
         if is_hidden(&cell, &cell.robot.joints) {
-            // As it was placed; a person would have moved it.
+            // Blocked as it was placed; a person would have moved it.
             continue;
         }
         let run = cell.clone().run(GuidedOptions { most_views: 8, ..options(1e-9) });
@@ -201,7 +201,7 @@ fn no_pose_is_proposed_with_the_arm_between_camera_and_board() {
     assert!(cells >= 3 && poses >= 20, "{poses} poses in {cells} cells are too few to say so");
 }
 
-/// Nothing is known of the camera at first, so the arm hardly moves.
+/// The place of the camera is unknown at first, so the arm hardly moves.
 #[test]
 fn the_first_moves_are_small_and_grow_with_what_is_known() {
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
@@ -264,7 +264,7 @@ fn a_pose_that_failed_is_not_proposed_again_and_many_in_a_row_end_it_as_a_lost_a
     let lost = guide.next(&known, &CancelToken::default());
     assert_eq!(lost, Next::End(Ending::BoardLost { poses: MOST_FAILURES }));
 
-    // Without an answer the arm does not go back to the first turns from wherever it is now.
+    // Without an answer the arm does not go back to the first turns from its present place.
     let mut guide = Guide::new(options(1e-9));
     assert!(matches!(guide.next(&known, &CancelToken::default()), Next::Go { .. }));
     guide.captured();
@@ -272,7 +272,7 @@ fn a_pose_that_failed_is_not_proposed_again_and_many_in_a_row_end_it_as_a_lost_a
     assert_eq!(guide.next(&without, &CancelToken::default()), Next::End(Ending::AnswerLost));
 }
 
-/// A view that is left out as an outlier says nothing: the next proposal is another one.
+/// A view that is left out as an outlier adds no information: the next proposal is another one.
 #[test]
 fn a_view_that_is_an_outlier_is_not_proposed_again() {
     let mut cell = GuidedCell::new(CellSetup::new(CellArm::Ur5e, Mode::EyeInHand, 8));
@@ -292,7 +292,7 @@ fn a_view_that_is_an_outlier_is_not_proposed_again() {
         assert_eq!(guide.failed, proposed);
         proposed.push(next);
         assert!(cell.capture(&plan.proposals[0].joints.expect("a chain")));
-        // The robot said that it is 3 cm from where it was.
+        // The robot reported a pose that is off by 3 cm.
         let view = cell.observations.views.last_mut().expect("it was captured");
         let off = nalgebra::Vector6::new(0.03, -0.02, 0.02, 0.0, 0.0, 0.0);
         view.base_from_tip = view.base_from_tip.map(|pose| pose.perturbed(&off));
@@ -324,7 +324,7 @@ fn a_board_that_is_never_seen_again_and_an_arm_that_touches_something_end_with_t
     assert_eq!(next(&mut Guide::new(options(1e-3)), &cell), Next::End(Ending::StartBlocked { by }));
 }
 
-/// What the arm is driven along, point by point: tip and camera of every move, by the chain and the true place of the camera.
+/// The path of the arm, point by point: tip and camera of every move, by the chain and the true place of the camera.
 fn places_on_the_way(cell: &GuidedCell, from: &JointValues, to: &JointValues) -> Vec<Isometry3<f64>> {
     (0..=200)
         .flat_map(|step| {
@@ -336,8 +336,8 @@ fn places_on_the_way(cell: &GuidedCell, from: &JointValues, to: &JointValues) ->
         .collect()
 }
 
-/// A rod that hangs into the room beside the first pose: without it some ways lead through where it is. Judged by where tip
-/// and camera are, not by the planner's own shapes.
+/// A rod that hangs into the space next to the first pose: without it some paths lead through its place. Judged by the
+/// places of tip and camera, not by the planner's own shapes.
 #[test]
 fn the_arm_is_driven_around_what_stands_in_the_way_and_within_its_ranges() {
     let mut crossed = 0;
@@ -373,7 +373,7 @@ fn the_arm_is_driven_around_what_stands_in_the_way_and_within_its_ranges() {
     assert!(crossed > 0, "the rods are in nobody's way: this test asserts nothing");
 }
 
-/// Nothing found is nothing against it; something found keeps it from ending as a success.
+/// Without findings nothing contradicts it; a finding keeps it from ending as a success.
 #[test]
 fn an_answer_that_something_speaks_against_is_no_success_however_small_its_error() {
     let mut cell = GuidedCell::new(CellSetup::new(CellArm::Ur5e, Mode::EyeInHand, 1));
@@ -382,7 +382,7 @@ fn an_answer_that_something_speaks_against_is_no_success_however_small_its_error
         let shift = nalgebra::Vector6::new(metres, 0.0, 0.0, 0.0, 0.0, 0.0);
         StatedUncertainty::Moved(vec![Alternative { shift, covariance: nalgebra::Matrix6::identity() * 1e-12 }])
     };
-    // Views are worth taking until it is good enough, and hardly worth it where that is doubted.
+    // Views are worth taking until it is good enough, and hardly worth it where it is doubted.
     let claims = [
         (StatedUncertainty::AsModelled, 0.0),
         (StatedUncertainty::Nothing, 1.0),
@@ -410,7 +410,8 @@ fn an_answer_that_something_speaks_against_is_no_success_however_small_its_error
     assert_eq!(endings[3], Some(Ending::Doubted), "it moves by a fifth of the goal");
 }
 
-/// What was not waited for is as likely too small as too large: where more views are not worth it, one answer below the goal is enough.
+/// An error that was not waited for is as likely too small as too large: where more views are not worth it, one answer below the
+/// goal is enough.
 #[test]
 fn an_end_that_no_small_error_brought_about_is_a_success_where_the_goal_is_reached() {
     let mut cell = GuidedCell::new(CellSetup::new(CellArm::Ur5e, Mode::EyeInHand, 1));
@@ -488,7 +489,7 @@ fn a_board_that_may_lie_partly_outside_the_image_is_not_surely_seen() {
     assert!(!surely(1e-4, 1000.0), "with doubts it is not");
 }
 
-/// Where an estimate was wrong about what it was sure of, it is less sure of the next one.
+/// Where an estimate was wrong in spite of a small uncertainty, the next one gets a larger uncertainty.
 #[test]
 fn after_views_without_the_board_the_next_are_chosen_with_more_room_about_it() {
     let mut cell = GuidedCell::new(CellSetup { free_lens: true, ..CellSetup::new(CellArm::Ur5e, Mode::EyeInHand, 4) });
@@ -510,7 +511,7 @@ fn after_views_without_the_board_the_next_are_chosen_with_more_room_about_it() {
     }
 }
 
-/// An unknown lens takes two turns and a tilt at the most before poses are chosen, and none of that loses the board.
+/// An unknown lens needs at most two turns and a tilt before poses are chosen, and none of these loses the board.
 #[test]
 fn with_an_unknown_lens_poses_are_chosen_from_the_fifth_view_on_at_the_latest() {
     for (arm, mode) in CellArm::ALL.into_iter().flat_map(|arm| [(arm, Mode::EyeInHand), (arm, Mode::EyeToHand)]) {
@@ -524,7 +525,7 @@ fn with_an_unknown_lens_poses_are_chosen_from_the_fifth_view_on_at_the_latest() 
     }
 }
 
-/// What a plan is made from in the middle of a session.
+/// The input of a plan in the middle of a session.
 fn half_way(seed: u64) -> (GuidedCell, Calibration) {
     let mut cell = GuidedCell::new(CellSetup::new(CellArm::Ur5e, Mode::EyeInHand, seed));
     let _begun = cell.run(GuidedOptions { most_views: 7, ..options(1e-9) });
@@ -554,12 +555,12 @@ fn a_pose_where_something_stands_is_not_planned() {
     }
 }
 
-/// The estimate may put the camera where the arm would touch it, or a person may have led the arm nearer to something than it
-/// would go by itself.
+/// The estimate may put the camera where the arm would touch it, or a person may have moved the arm closer to something than
+/// the planner would.
 #[test]
 fn an_arm_that_begins_too_near_to_something_is_driven_away_from_it() {
     let (mut cell, calibration) = half_way(2);
-    // Beside the tip, at half of the free space that is kept.
+    // Next to the tip, at half of the clearance that is kept.
     let (tip, body) = (cell.base_from_tip(), cell.robot.arm.clone());
     let mut block = (0..100).map(|k| {
         let beside = Isometry3::translation(0.05 + 0.005 * f64::from(k), 0.0, 0.0);
@@ -577,7 +578,7 @@ fn an_arm_that_begins_too_near_to_something_is_driven_away_from_it() {
     assert!(!planned(&cell, &calibration, 1.5).proposals.is_empty());
 }
 
-/// Until then an arm that errs from place to place looks like one that errs at random, and its error is stated too small.
+/// Until then pose-dependent errors of an arm look like random ones, and its error is stated too small.
 #[test]
 fn it_does_not_end_before_errors_that_depend_on_the_place_are_looked_for() {
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
@@ -601,7 +602,7 @@ fn camera_and_board_are_where_the_estimate_has_them_when_ways_are_checked() {
     let before_board = Isometry3::translation(centre.x, centre.y, -0.03);
     let tip = base_from_target.isometry() * before_board * tip_from_camera.isometry().inverse();
     let near = cell.robot.arm.reach(&Pose::from_isometry(tip), &cell.robot.joints).expect("it is in reach");
-    // Without the table, on which the board lies.
+    // Without the table on which the board is.
     let mut bare = cell.robot.clone();
     bare.around.obstacles.clear();
     bare.arm.carried = vec![Carried::camera(tip_from_camera.isometry())];
@@ -618,7 +619,7 @@ fn camera_and_board_are_where_the_estimate_has_them_when_ways_are_checked() {
     }
 }
 
-/// Where a capture takes no time the way counts, where it takes long the gain alone.
+/// Where a capture takes no time the travel time counts, where it takes long the gain alone.
 #[test]
 fn what_comes_first_gains_most_for_its_time() {
     let mut shorter = 0;

@@ -14,7 +14,7 @@ impl Why {
         }
     }
 
-    /// In one sentence.
+    /// The reason in one sentence.
     pub fn text(&self) -> Text {
         match *self {
             Self::FirstTurns { turn_rad } => text!(
@@ -67,7 +67,7 @@ impl Ending {
         }
     }
 
-    /// What it means and, where it is no success, what to do.
+    /// What it means and, where it is not a success, what to do.
     pub fn text(&self) -> Text {
         match self {
             Self::GoalReached { promised } => {
@@ -135,7 +135,7 @@ impl Ending {
         }
     }
 
-    /// Whether the answer is as good as was asked for.
+    /// Whether the answer is as good as requested.
     pub fn is_success(&self) -> bool {
         matches!(self, Self::GoalReached { .. })
     }

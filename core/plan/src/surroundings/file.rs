@@ -1,4 +1,4 @@
-//! What stands around, in a file that a person writes; its keys are in `docs/reference/surroundings.md`.
+//! The surroundings of an arm, in a file written by hand; its keys are in `docs/reference/surroundings.md`.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -11,9 +11,9 @@ use super::{Obstacle, SpeedLimits, Surroundings, WorkVolume};
 use handeye_wording::text;
 use handeye_wording::{English, Text};
 
-/// How far from 1 the length of a quaternion may be, as in dataset folders.
+/// Tolerance of the length of a quaternion, as in dataset folders.
 const UNIT_TOLERANCE: f64 = 1e-3;
-/// A longer length \[m\] is taken for millimetres: no arm of this program reaches so far.
+/// A longer length \[m\] is taken for millimetres: no supported arm reaches that far.
 const FARTHEST_M: f64 = 10.0;
 /// Faster \[m/s\] than any arm: millimetres per second.
 const FASTEST_M_S: f64 = 20.0;
@@ -22,12 +22,12 @@ const FASTEST_M_S: f64 = 20.0;
 #[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum SurroundingsError {
-    /// The file system does not give it.
+    /// The file system cannot read it.
     #[error("{file} cannot be read: {source}", file = file.display())]
     Unreadable {
         /// The file that was read.
         file: PathBuf,
-        /// Why.
+        /// The reason.
         source: std::io::Error,
     },
     /// Not TOML, or an unknown or missing key.
@@ -35,15 +35,15 @@ pub enum SurroundingsError {
     Syntax {
         /// The file that was read.
         file: PathBuf,
-        /// What the parser says, with the line.
+        /// The parser's message, with the line.
         message: String,
     },
-    /// A value that makes no sense.
+    /// A value that is not valid.
     #[error("{file}, {entry}", file = file.display(), entry = entry.with_fault(fault))]
     Entry {
         /// The file that was read.
         file: PathBuf,
-        /// Which one.
+        /// The entry.
         entry: EntryName,
         /// What is wrong.
         fault: EntryFault,
@@ -54,12 +54,12 @@ pub enum SurroundingsError {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum EntryFault {
-    /// A number that is none.
+    /// A number that is not finite.
     NotFinite {
         /// The key of the entry.
         key: &'static str,
     },
-    /// An edge that has no length.
+    /// An edge without a positive length.
     Size {
         /// The edge.
         value: f64,
@@ -68,7 +68,7 @@ pub enum EntryFault {
     Millimetres {
         /// The key of the entry.
         key: &'static str,
-        /// The number as it stands in the file.
+        /// The number as written in the file.
         value: f64,
     },
     /// A quaternion of another length.
@@ -83,26 +83,26 @@ pub enum EntryFault {
         /// The axis whose limits are the wrong way round.
         axis: char,
     },
-    /// A speed that is none.
+    /// A value that is not a valid speed.
     Speed {
         /// The key of the entry.
         key: &'static str,
-        /// The number as it stands in the file.
+        /// The number as written in the file.
         value: f64,
     },
     /// A tip faster than any arm.
     MillimetresPerSecond {
-        /// The number as it stands in the file.
+        /// The number as written in the file.
         value: f64,
     },
-    /// Nothing to call it by.
+    /// An entry without a name.
     NoName,
     /// Two boxes of one name.
     SameName,
 }
 
 impl EntryFault {
-    /// It in a sentence without its subject, with what to do.
+    /// The fault in a sentence without its subject, with what to do.
     pub(crate) fn text(&self) -> Text {
         match self {
             Self::NotFinite { key } => text!("{key} is not finite", key = key),
@@ -150,7 +150,7 @@ pub enum EntryName {
     Box {
         /// Counted from 1.
         number: usize,
-        /// What it is called.
+        /// Its name.
         name: String,
     },
     /// Any other table, by its name.
@@ -178,17 +178,17 @@ impl EntryName {
     }
 }
 
-/// What a file of surroundings says, in its own units; [`Self::surroundings`] is what it means.
+/// The content of a file of surroundings, in its own units; [`Self::surroundings`] converts it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct KeepOutFile {
     /// What must not be touched.
     #[serde(default, rename = "box", skip_serializing_if = "Vec::is_empty")]
     pub boxes: Vec<KeepOutBox>,
-    /// Where tip and camera have to stay.
+    /// The volume in which tip and camera have to stay.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub volume: Option<KeepInVolume>,
-    /// How fast the arm may go.
+    /// Limits of speed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limits: Option<KeepBelow>,
 }
@@ -197,7 +197,7 @@ pub struct KeepOutFile {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct KeepOutBox {
-    /// What it is called in messages; no two alike.
+    /// Its name in messages, unique in the file.
     pub name: String,
     /// Its middle in the base, metres.
     pub centre_m: [f64; 3],
@@ -206,7 +206,7 @@ pub struct KeepOutBox {
     /// Any rotation, a unit quaternion; not together with `yaw_deg`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation_xyzw: Option<[f64; 4]>,
-    /// About z of the base, degrees.
+    /// Rotation about z of the base, degrees.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub yaw_deg: Option<f64>,
 }
@@ -228,13 +228,13 @@ pub struct KeepBelow {
     /// Largest speed of the tip, m/s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip_speed_m_s: Option<f64>,
-    /// Of every joint that turns, degrees/s.
+    /// Largest speed of every revolute joint, degrees/s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint_speed_deg_s: Option<f64>,
 }
 
 impl Surroundings {
-    /// Out of a file.
+    /// Reads a file.
     ///
     /// # Errors
     /// [`SurroundingsError`] names the file and the entry.
@@ -244,17 +244,17 @@ impl Surroundings {
 }
 
 impl KeepOutFile {
-    /// Out of a file.
+    /// Reads a file.
     ///
     /// # Errors
-    /// [`SurroundingsError::Unreadable`] and [`SurroundingsError::Syntax`]; what the values mean is not looked at.
+    /// [`SurroundingsError::Unreadable`] and [`SurroundingsError::Syntax`]; the values are not checked.
     pub fn read(file: &Path) -> Result<Self, SurroundingsError> {
         let text = fs::read_to_string(file)
             .map_err(|source| SurroundingsError::Unreadable { file: file.to_owned(), source })?;
         Self::parse(file, &text)
     }
 
-    /// Out of the text of a file; its name is for messages.
+    /// Parses the text of a file; its name is for messages.
     ///
     /// # Errors
     /// [`SurroundingsError::Syntax`].
@@ -265,15 +265,15 @@ impl KeepOutFile {
         })
     }
 
-    /// The text of such a file.
+    /// The content as the text of a file.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("names and numbers can be written as TOML")
     }
 
-    /// What it means; the name of the file is for messages.
+    /// The surroundings that it describes; the name of the file is for messages.
     ///
     /// # Errors
-    /// [`SurroundingsError::Entry`] for the first entry that makes no sense.
+    /// [`SurroundingsError::Entry`] for the first entry that is not valid.
     pub fn surroundings(&self, file: &Path) -> Result<Surroundings, SurroundingsError> {
         let at = |entry: EntryName| move |fault| SurroundingsError::Entry { file: file.to_owned(), entry, fault };
         let mut obstacles: Vec<Obstacle> = Vec::with_capacity(self.boxes.len());
@@ -290,7 +290,7 @@ impl KeepOutFile {
 }
 
 impl KeepOutFile {
-    /// What every entry means that makes sense by itself; a box without a name of its own is one all the same.
+    /// The surroundings by all entries that are valid on their own; a box without a name is included.
     pub fn sensible(&self) -> Surroundings {
         let named = |entry: &KeepOutBox| {
             let name = if entry.name.trim().is_empty() { "box".to_owned() } else { entry.name.clone() };
@@ -305,10 +305,10 @@ impl KeepOutFile {
 }
 
 impl KeepOutBox {
-    /// What it means.
+    /// The obstacle that it describes.
     ///
     /// # Errors
-    /// [`EntryFault`] says which value makes no sense.
+    /// [`EntryFault`] states which value is not valid.
     pub(crate) fn obstacle(&self) -> Result<Obstacle, EntryFault> {
         if self.name.trim().is_empty() {
             return Err(EntryFault::NoName);

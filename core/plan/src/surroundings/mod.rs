@@ -1,4 +1,4 @@
-//! What stands around an arm: one model for planning, jogging and following.
+//! The surroundings of an arm: one model for planning, jogging and following.
 
 mod file;
 
@@ -6,21 +6,21 @@ pub use file::{EntryFault, EntryName, KeepBelow, KeepInVolume, KeepOutBox, KeepO
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-/// What stands around an arm, where it has to stay and how fast it may go.
+/// Obstacles around an arm, the volume in which it has to stay and its limits of speed.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Surroundings {
-    /// What must not be touched.
+    /// Obstacles, which must not be touched.
     pub obstacles: Vec<Obstacle>,
-    /// Where tip and camera have to stay; everywhere without one.
+    /// The volume in which tip and camera have to stay; unlimited without one.
     pub volume: Option<WorkVolume>,
-    /// How fast it may go, below what the arm can.
+    /// Limits of speed, below those of the arm.
     pub limits: SpeedLimits,
 }
 
 /// A box that must not be touched.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Obstacle {
-    /// What it is called in messages.
+    /// Its name in messages.
     pub name: String,
     /// Pose of its centre in the base, which is the world of a simulation.
     pub world_from_centre: Isometry3<f64>,
@@ -37,22 +37,22 @@ pub struct WorkVolume {
     pub max_m: Point3<f64>,
 }
 
-/// Limits of speed; `None` for what only the arm limits.
+/// Limits of speed; `None` for those that only the arm limits.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SpeedLimits {
     /// Largest speed of the tip, m/s.
     pub tip_m_s: Option<f64>,
-    /// Of every joint that turns, rad/s.
+    /// Largest speed of every revolute joint, rad/s.
     pub joint_rad_s: Option<f64>,
 }
 
 impl Surroundings {
-    /// Boxes alone.
+    /// Surroundings of boxes only.
     pub fn of(obstacles: Vec<Obstacle>) -> Self {
         Self { obstacles, ..Self::default() }
     }
 
-    /// Both: all boxes, the room that both volumes leave, the lower of the limits.
+    /// Both together: all boxes, the intersection of the volumes, the lower of the limits.
     #[must_use]
     pub fn and(mut self, other: Self) -> Self {
         self.obstacles.extend(other.obstacles);
@@ -76,7 +76,7 @@ fn lower(a: Option<f64>, b: Option<f64>) -> Option<f64> {
 }
 
 impl Obstacle {
-    /// A box of this name; its pose is that of its centre in the base, its edges are metres.
+    /// A box with this name; its pose is that of its centre in the base, its edges are metres.
     pub fn new(name: impl Into<String>, world_from_centre: Isometry3<f64>, size_m: [f64; 3]) -> Self {
         Self { name: name.into(), world_from_centre, size_m }
     }
@@ -105,12 +105,12 @@ impl WorkVolume {
 }
 
 impl SpeedLimits {
-    /// The speed of a joint that turns \[rad/s\], no faster than allowed.
+    /// The speed of a revolute joint \[rad/s\], clamped to the limit.
     pub fn joint(&self, rad_s: f64) -> f64 {
         self.joint_rad_s.map_or(rad_s, |limit| limit.min(rad_s))
     }
 
-    /// The speed of the tip \[m/s\], no faster than allowed.
+    /// The speed of the tip \[m/s\], clamped to the limit.
     pub fn tip(&self, m_s: f64) -> f64 {
         self.tip_m_s.map_or(m_s, |limit| limit.min(m_s))
     }

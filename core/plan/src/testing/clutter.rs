@@ -1,5 +1,5 @@
 //! Guided sessions among random boxes, judged by geometry that has nothing in common with the planner's distances: points on
-//! the surfaces of links, camera and board, looked at on the whole way of every move.
+//! the surfaces of links, camera and board, checked along the whole path of every move.
 
 use std::collections::BTreeSet;
 
@@ -17,25 +17,25 @@ use handeye_geometry::testing::BOARD;
 
 /// Boxes of a scene.
 const BOXES: usize = 10;
-/// Free space that they leave about the arm where it begins, metres: nothing is known of the hand then.
+/// Clearance that they leave around the arm at the start, metres: nothing is known of the hand then.
 const ROOM_AT_START_M: f64 = 0.06;
-/// Points along and about a link.
+/// Points along and around a link.
 const ALONG: usize = 9;
 const ABOUT: usize = 10;
 /// Points along an edge of the board.
 const SHEET_POINTS: usize = 24;
-/// Places that are looked at on the way of a move.
+/// Places that are checked along a move.
 const PLACES: usize = 240;
 /// Edges of the clear sheet beyond the outermost corners, in squares, of which one is printed.
 const EDGE_SQUARES: f64 = 2.0;
 /// A camera's housing: radius and length behind the lens, metres.
 const HOUSING_M: (f64, f64) = (0.03, 0.03);
-/// Edge of a camera beside the robot, metres.
+/// Edge of a camera next to the robot, metres.
 const CAMERA_BESIDE_M: f64 = 0.1;
 /// Limits that the arm has to keep, m/s and rad/s.
 const LIMITS: SpeedLimits = SpeedLimits { tip_m_s: Some(0.25), joint_rad_s: Some(0.8) };
 
-/// What came of moves. See [`session`].
+/// Results of moves. See [`session`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tally {
     /// Sessions that were run.
@@ -72,7 +72,7 @@ impl Default for Tally {
 }
 
 impl Tally {
-    /// Of both.
+    /// The sum of both.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         Self {
@@ -88,8 +88,8 @@ impl Tally {
     }
 }
 
-/// A guided session of so many views among boxes at random, with limits of speed. With `is_known` false the planner is not
-/// told of the boxes: what it would then drive into shows that the judgement sees contacts.
+/// A guided session of this many views among random boxes, with limits of speed. With `is_known` false the planner does
+/// not know of the boxes: its collisions then show that the check detects contacts.
 ///
 /// # Panics
 /// Never: joint values are those of the arm.
@@ -162,7 +162,7 @@ fn judged(cell: &GuidedCell, body: &Body, solid: &[Obstacle], from: &JointValues
     }
 }
 
-/// How far a point is outside a box along the axis on which it is farthest, metres; zero and less inside.
+/// Distance of a point from a box along the axis on which it is farthest outside, metres; zero and less inside.
 fn outside_m(solid: &Obstacle, point: &Point3<f64>) -> f64 {
     let local = solid.world_from_centre.inverse() * point;
     (0..3).map(|axis| local[axis].abs() - 0.5 * solid.size_m[axis]).fold(f64::NEG_INFINITY, f64::max)
@@ -186,7 +186,7 @@ fn clutter(seed: u64, start: &[(Part, Point3<f64>)]) -> Vec<Obstacle> {
     boxes
 }
 
-/// The one of board and camera that the arm does not carry, where it truly is.
+/// The one of board and camera that the arm does not carry, at its true place.
 fn beside(cell: &GuidedCell, mode: Mode) -> Obstacle {
     match mode {
         Mode::EyeInHand => {
@@ -206,22 +206,22 @@ fn sheet_m() -> [f64; 2] {
     [BOARD.extent().x + edge_m, BOARD.extent().y + edge_m]
 }
 
-/// Of what a point is.
+/// The part that a point belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Part {
-    /// Of the link with this number.
+    /// The link with this number.
     Link(usize),
-    /// Of camera or board.
+    /// Camera or board.
     Hand,
 }
 
-/// Points on the surfaces of the arm and of what it carries, by the true place of that.
+/// Points on the surfaces of the arm and of what it carries, at its true place.
 struct Body {
     links: Vec<LinkCapsule>,
     of_link: Vec<(usize, Point3<f64>)>,
-    /// In the tip.
+    /// Points of the hand, in the frame of the tip.
     of_hand: Vec<Point3<f64>>,
-    /// What is in each other where the arm begins: so short are the links between them that their tubes overlap everywhere.
+    /// Parts that overlap where the arm begins: the links between them are so short that their tubes overlap everywhere.
     by_design: BTreeSet<(Part, usize)>,
 }
 
@@ -253,7 +253,7 @@ impl Body {
         body
     }
 
-    /// All points where they are with these joint values.
+    /// All points at their places with these joint values.
     fn at(&self, cell: &GuidedCell, joints: &JointValues) -> Vec<(Part, Point3<f64>)> {
         let arm = &cell.robot.arm;
         let frames = arm.chain.frames(joints).expect("its own joints");
@@ -263,8 +263,8 @@ impl Body {
         of_link.chain(self.of_hand.iter().map(|point| (Part::Hand, tip * point))).collect()
     }
 
-    /// What is in which link: links that are four joints or more apart, and the hand in any link but the last. Nearer ones have so little
-    /// between them that the tubes overlap in places where the arm itself does not.
+    /// Which parts are inside which link: links that are four joints or more apart, and the hand in any link but the last. Nearer
+    /// ones are so close together that the tubes overlap in places where the arm itself does not.
     fn inside(
         &self,
         cell: &GuidedCell,

@@ -48,7 +48,7 @@ impl CellArm {
         }
     }
 
-    /// Over a board in front of the arm.
+    /// Joint values over a board in front of the arm.
     fn home(self) -> Vec<f64> {
         match self {
             // Its base looks along -x.
@@ -59,66 +59,66 @@ impl CellArm {
     }
 }
 
-/// What a cell is made from.
+/// Setup of a cell.
 #[derive(Debug, Clone, Copy)]
 pub struct CellSetup {
     /// Its arm.
     pub arm: CellArm,
-    /// Where the camera sits.
+    /// Where the camera is mounted.
     pub mode: Mode,
-    /// What corners and robot err by.
+    /// Errors of corners and robot.
     pub noise: Noise,
     /// Whether the lens is to be estimated.
     pub free_lens: bool,
     /// Focal length \[px\] of a first view that is straight on, with the board close to the edge of the image; `None` for that
     /// of the other studies, and a first view that is tilted a little.
     pub straight: Option<f64>,
-    /// What is not as it is stated to be.
+    /// What differs from the stated values.
     pub untold: HiddenErrors,
     /// Seed of places and noise.
     pub seed: u64,
 }
 
 impl CellSetup {
-    /// A good robot and a good camera whose lens is known, a first view that is tilted a little, and all as it is stated to be.
+    /// A good robot and a good camera whose lens is known, a first view that is tilted a little, and everything as stated.
     pub fn new(arm: CellArm, mode: Mode, seed: u64) -> Self {
         Self { arm, mode, noise: REALISTIC, free_lens: false, straight: None, untold: HiddenErrors::NOTHING, seed }
     }
 }
 
-/// What a guide is not told, and what its estimate has to find out.
+/// Errors that the guide does not know, and that its estimate has to find.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HiddenErrors {
     /// Deflection of the middle of the board against its edges along x and along y, metres.
     pub bend_m: [f64; 2],
     /// True focal length over that of the lens which is stated to be known.
     pub focal: f64,
-    /// Standard deviations of what every joint but the last is displaced by about and along each axis, radians and metres; with them the
-    /// views know the joints.
+    /// Standard deviations of the displacement of every joint but the last about and along each axis, radians and metres; with them
+    /// the views have joint values.
     pub links: Option<(f64, f64)>,
 }
 
 impl HiddenErrors {
-    /// All is as it is stated to be.
+    /// Everything is as stated.
     pub const NOTHING: Self = Self { bend_m: [0.0; 2], focal: 1.0, links: None };
 }
 
-/// Where everything is in a cell, and what its arm must not touch.
+/// Places of everything in a cell, and what its arm must not touch.
 #[derive(Debug, Clone)]
 pub struct Places {
     /// The arm, with nothing on its tip.
     pub arm: plan::Arm,
-    /// Where its joints are at the first view, radians; of a prismatic joint metres.
+    /// Its joint values at the first view, radians; metres for a prismatic joint.
     pub joints: JointValues,
-    /// What stands around, besides camera and board.
+    /// The surroundings, without camera and board.
     pub around: Surroundings,
-    /// Camera and board.
+    /// Poses of camera and board.
     pub links: Links,
     /// The lens.
     pub intrinsics: Intrinsics,
 }
 
-/// From the first pose to where errors of the robot that depend on the place have the size of the noise, metres: about
+/// Distance from the first pose at which pose-dependent errors of the robot are as large as the noise, metres: about
 /// the RMS spread of the tip in a guided session.
 const FIELD_SPREAD_M: f64 = 0.15;
 
@@ -130,21 +130,21 @@ pub struct GuidedCell {
     intrinsics: Intrinsics,
     /// The true places of camera and board.
     pub links: Links,
-    /// The arm where it stands now.
+    /// The arm at its present place.
     pub robot: Robot,
-    /// What was seen so far.
+    /// The observations so far.
     pub observations: Observations,
-    /// The board as it is.
+    /// Points of the true board.
     points: Vec<Point3<f64>>,
-    /// Errors of the robot that depend on where it stands.
+    /// Pose-dependent errors of the robot.
     field: Option<Field>,
-    /// The chain as it is, where it is not as its controller has it.
+    /// The true chain, where it differs from the controller's.
     true_chain: Option<Arm>,
-    /// Joint values of the views, where they know them, radians.
+    /// Joint values of the views, where they have them, radians.
     joints_rad: Vec<Option<Vec<f64>>>,
 }
 
-/// What came of a guided session.
+/// Result of a guided session.
 #[derive(Debug, Clone)]
 pub struct GuidedRun {
     /// Why it ended.
@@ -153,7 +153,7 @@ pub struct GuidedRun {
     pub calibration: Option<Calibration>,
     /// Moves that showed no board.
     pub failed: usize,
-    /// Of each number of views with an answer: views, stated 95 % error and true error, metres.
+    /// For each number of views with an answer: views, stated 95 % error and true error, metres.
     pub history: Vec<(usize, f64, f64)>,
     /// Every pose that was proposed.
     pub steps: Vec<Step>,
@@ -165,9 +165,9 @@ pub struct GuidedRun {
 const TOOL_M: [f64; 3] = [0.0, 0.0, 0.1];
 /// Free space that the arm keeps, metres.
 const CLEARANCE_M: f64 = 0.02;
-/// How fast its joints are driven.
+/// Limits with which its joints are driven.
 const PACE: Pace = Pace { speed: 1.0, acceleration: 2.0, jerk: f64::INFINITY };
-/// Table on which the arm stands.
+/// Table on which the arm is mounted.
 const TABLE: [f64; 3] = [4.0, 4.0, 0.1];
 
 impl GuidedCell {
@@ -191,8 +191,8 @@ impl GuidedCell {
         cell
     }
 
-    /// With places that are given, for which `arm`, `straight` and errors that depend on the place are left out of the setup;
-    /// `None` where the arm touches something at the first view, or the board is not wholly in it.
+    /// A cell with given places, for which `arm`, `straight` and pose-dependent errors of the setup are ignored; `None` where
+    /// the arm touches something at the first view, or the board is not wholly in it.
     pub fn placed(setup: CellSetup, places: Places) -> Option<Self> {
         let cell = Self::within_reach(setup, places)?;
         cell.clone().view(&cell.base_from_tip()).map(|_| cell)
@@ -213,12 +213,12 @@ impl GuidedCell {
             }
         };
         arm.carried = vec![carried];
-        // Where the other of camera and board is the guide has to find out.
+        // The place of the other one of camera and board has to be found by the guide.
         let all = around.clone().and(Surroundings::of(vec![beside]));
         if !arm.is_free(&joints, &all, CLEARANCE_M) {
             return None;
         }
-        // With all that is estimated of a lens by default, of which it may have none.
+        // With all parameters that are estimated of a lens by default, which this one may not have.
         let free = match lens.distortion {
             Distortion::None => Intrinsics { distortion: DEFAULT_MODEL, ..lens },
             _ => lens,
@@ -228,7 +228,8 @@ impl GuidedCell {
         let true_chain = setup.untold.links.map(|(rad, m)| {
             let mut moved: Vec<Isometry3<f64>> =
                 (0..arm.chain.joint_count()).map(|_| se3::exp(&noise_twist(&mut of_links, m, rad))).collect();
-            // A tool behind the last joint would be found with the same arm, which hides what that is moved by along its axis.
+            // A tool behind the last joint would be found with the same arm, which hides the displacement of that along its
+            // axis.
             moved[arm.chain.joint_count() - 1] = Isometry3::identity();
             arm.chain.displaced(&moved).expect("small")
         });
@@ -255,7 +256,7 @@ impl GuidedCell {
         })
     }
 
-    /// Where the controller says the tip is.
+    /// The tip pose by the controller.
     ///
     /// # Panics
     /// Never: the joints are those of the arm.
@@ -268,7 +269,7 @@ impl GuidedCell {
         &self.intrinsics
     }
 
-    /// Drives the arm there and captures; whether the whole board was in the image.
+    /// Drives the arm there and captures; returns whether the whole board was in the image.
     pub fn capture(&mut self, joints: &JointValues) -> bool {
         self.robot.joints = *joints;
         let at = self.base_from_tip();
@@ -281,16 +282,17 @@ impl GuidedCell {
         true
     }
 
-    /// Where the tip is with these joint values.
+    /// The true tip pose with these joint values.
     fn true_tip(&self, joints: &[f64]) -> Pose<Base, Tip> {
         let Some(chain) = &self.true_chain else { return self.robot.arm.tip(joints).expect("its own joints") };
         plan::Arm { chain: chain.clone(), ..self.robot.arm.clone() }.tip(joints).expect("its own joints")
     }
 
-    /// Captures at a tip pose that the robot reports, however it got there; whether the whole board was in the image.
+    /// Captures at a tip pose that the robot reports, however it got there; returns whether the whole board was in the
+    /// image.
     ///
     /// # Panics
-    /// With links that are off: where the tip really is depends on the joints.
+    /// With link errors: the true tip pose then depends on the joints.
     pub fn capture_at(&mut self, base_from_tip: &Pose<Base, Tip>) -> bool {
         assert!(self.true_chain.is_none(), "the joints have to be known");
         let Some(view) = self.view(base_from_tip) else { return false };
@@ -299,7 +301,7 @@ impl GuidedCell {
         true
     }
 
-    /// What would be captured at a tip pose that the robot reports.
+    /// The view that would be captured at a tip pose that the robot reports.
     fn view(&mut self, base_from_tip: &Pose<Base, Tip>) -> Option<ObservedView> {
         let error = robot_error(&mut self.rng, &self.setup.noise);
         let by_place = self.field.map_or_else(Isometry3::identity, |field| field.error(base_from_tip));
@@ -319,8 +321,8 @@ impl GuidedCell {
         Some(ObservedView::new(name, Some(*base_from_tip), Some(corners.into())))
     }
 
-    /// How far a calibration puts a point from where it is, metres: where the camera saw the board, which is where the
-    /// expected error is stated.
+    /// Error of a point by a calibration, metres: where the camera saw the board, which is where the expected error is
+    /// stated.
     pub fn true_error_m(&self, calibration: &Calibration) -> Option<f64> {
         let estimated = calibration.hand_eye?.mount_from_camera();
         let point = calibration.joint.as_ref()?.reference_point;
@@ -328,8 +330,8 @@ impl GuidedCell {
         Some((off.isometry() * point - point).norm())
     }
 
-    /// What errors of the robot that depend on the place are in the middle of the session's places: a camera on the tip
-    /// cannot be told from one that is off by as much, and measures with the same arm.
+    /// Pose-dependent error of the robot in the middle of the session's places: a camera on the tip cannot be
+    /// distinguished from one that is off by as much, and measures with the same arm.
     fn mount_from_tip(&self) -> Pose<Mount, Mount> {
         let tips = self.observations.views.iter().filter_map(|view| view.base_from_tip);
         let count = self.observations.views.len() as f64;
@@ -341,14 +343,14 @@ impl GuidedCell {
         }
     }
 
-    /// The model of what is true.
+    /// The model with the true values.
     pub fn truth(&self) -> ViewModel {
         let Self { setup, intrinsics, links, .. } = self;
         let hand_eye = HandEye::new(setup.mode, links.mount_from_camera, links.anchor_from_target);
         ViewModel::known(hand_eye, *intrinsics, setup.free_lens, setup.noise, &BOARD)
     }
 
-    /// What a guide is told, with an answer from the views so far.
+    /// The input of a guide, with an answer from the views so far.
     pub fn known<'a>(&'a self, calibration: Option<&'a Calibration>, elapsed_s: f64) -> Known<'a> {
         Known { observations: &self.observations, calibration, robot: Some(&self.robot), elapsed_s }
     }
@@ -360,7 +362,7 @@ impl GuidedCell {
         calibrate_with(&self.observations, Method::Joint, Options::default(), &wanted, &CancelToken::default()).ok()
     }
 
-    /// The arm as its controller has it.
+    /// The arm by its controller.
     fn arm_of_views(&self) -> ArmOfViews {
         let plan::Arm { chain, world_from_arm, connection_from_tip, .. } = &self.robot.arm;
         let mounted =
@@ -374,10 +376,11 @@ impl GuidedCell {
     }
 
     /// Distances of a tool from points of the board that the camera saw, one a view, when it is sent there by corrected commands,
-    /// metres, against the board, or beside the arm along the mean axis of the tip; of those that the arm gets to.
+    /// metres, against the board, or with a camera next to the robot along the mean axis of the tip; only those that the arm
+    /// reaches.
     ///
     /// # Panics
-    /// Where the calibration does not know the arm.
+    /// Where the calibration has no arm.
     pub fn touches_m(&self, calibration: &Calibration) -> Vec<f64> {
         let errors = calibration.arm().expect("the joints are known");
         let corrected = CorrectedArm::new(self.arm_of_views().placement.arm, errors).expect("its own");
@@ -449,7 +452,7 @@ impl GuidedCell {
     }
 }
 
-/// Places at random, with the board in view of an arm that gets there; `None` where it does not.
+/// Random places, with the board in view of an arm that gets there; `None` where it does not.
 fn drawn(setup: CellSetup, rng: &mut ChaCha8Rng) -> Option<Places> {
     let mut about = |scale: f64| (rng.random::<f64>() * 2.0 - 1.0) * scale;
     let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
@@ -482,7 +485,7 @@ fn drawn(setup: CellSetup, rng: &mut ChaCha8Rng) -> Option<Places> {
             (beside, lying, first_tip)
         }
         Mode::EyeToHand => {
-            // The camera stands on the far side and looks at the board that the arm holds up in front of it.
+            // The camera is on the far side and looks at the board that the arm holds up in front of it.
             let board_at = Vector3::new(0.45 + about(0.05), about(0.1), 0.45 + about(0.05));
             let facing = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -std::f64::consts::FRAC_PI_2);
             let camera_turn = facing * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(0.3));

@@ -1,4 +1,4 @@
-//! A person who brings about the views that are asked for, with a hand that trembles.
+//! A person who takes the requested views, with a hand that trembles.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector2, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
@@ -20,23 +20,23 @@ use handeye_simulate::session::seen;
 const LOOK_S: f64 = 0.1;
 /// How far a hand moves in that time [m, rad].
 const STEP: (f64, f64) = (0.01, 0.044);
-/// What it trembles by in that time [m, rad].
+/// Its tremor in that time [m, rad].
 const TREMOR: (f64, f64) = (0.001, 0.005);
-/// How well it aims before somebody says what to change: half of the errors are smaller [m, rad].
+/// Error of its aim before it gets advice: half of the errors are smaller [m, rad].
 const AIM: (f64, f64) = (0.03, 0.12);
 /// Good looks in a row before there is a capture: as long as a window waits for an arm at rest.
 const GOOD_LOOKS: usize = 5;
-/// After so long somebody gives up a view, seconds.
+/// Time after which a person gives up a view, seconds.
 const PATIENCE_S: f64 = 60.0;
 
-/// What came of a session by hand.
+/// Result of a session by hand.
 #[derive(Debug, Clone)]
 pub struct HandRun {
-    /// Why it ended; `None` where there were as many views as wanted before.
+    /// Why it ended; `None` where the wanted number of views was reached before.
     pub ending: Option<Ending>,
     /// The answer from all of them.
     pub calibration: Option<Calibration>,
-    /// How long each view took, seconds.
+    /// Duration of each view, seconds.
     pub took_s: Vec<f64>,
     /// Captures in which the board was not whole.
     pub refused: usize,
@@ -44,7 +44,7 @@ pub struct HandRun {
     pub skipped: usize,
 }
 
-/// Takes so many views, the first where the arm of the cell stands.
+/// Takes this many views, the first at the present pose of the arm of the cell.
 ///
 /// # Panics
 /// When the board is not in view there.
@@ -82,13 +82,13 @@ pub fn session(cell: &mut GuidedCell, options: GuidedOptions, views: usize, seed
     run
 }
 
-/// What is found in a view; `None` where the board is not whole.
+/// The corners found in a view; `None` where the board is not whole.
 pub fn corners(camera: &Intrinsics, camera_from_target: &Pose<Camera, Target>) -> Option<Vec<Corner>> {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     seen(&mut rng, camera, camera_from_target.isometry(), &BOARD.points(), 0.0, |_| Vector2::zeros())
 }
 
-/// Where the hand gets to, and how long it takes.
+/// The pose that the hand reaches, and the time that it takes.
 fn bring_about(
     wanted: &Wanted,
     from: &Pose<Camera, Target>,
@@ -97,7 +97,7 @@ fn bring_about(
 ) -> (Pose<Camera, Target>, f64) {
     let mut about = |scale: f64| (rng.random::<f64>() * 2.0 - 1.0) * scale;
     let mut vector = |scale: f64| Vector3::new(about(scale), about(scale), about(scale));
-    // A hand aims beside the goal, the less so the longer it is told.
+    // A hand misses the goal, by less the longer it gets advice.
     let mut aim = (vector(2.0 * AIM.0), vector(2.0 * AIM.1));
     let mut present = *from.isometry();
     let (mut good, mut time_s) = (0, 0.0);

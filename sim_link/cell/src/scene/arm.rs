@@ -1,4 +1,4 @@
-//! Which arm stands in the cell, as a scene file says it.
+//! The arm of the cell, as a scene file gives it.
 
 use std::path::{Path, PathBuf};
 
@@ -26,13 +26,13 @@ pub enum ArmSpec {
 pub struct UrdfSpec {
     /// The file. In a scene file it is relative to the folder of that; here to the working directory.
     pub urdf: PathBuf,
-    /// The link that stands in the arm frame; the only one without a parent if absent.
+    /// The link that is fixed in the arm frame; if absent, the only link without a parent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub base: Option<String>,
     /// The link that is the connection; the only one below the base without a child if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tip: Option<String>,
-    /// What stands in the file, where that is built in.
+    /// Text of the URDF file, for one that is built in.
     #[serde(skip)]
     text: Option<&'static str>,
 }
@@ -52,7 +52,7 @@ impl Default for ArmSpec {
 }
 
 impl ArmSpec {
-    /// The arm, standing in the arm frame, with the connection as its tip and the ranges and speeds that it comes with.
+    /// The arm in the arm frame, with the connection as its tip and the ranges and speeds that it comes with.
     ///
     /// # Errors
     /// [`UrdfError`] names file, line and element.
@@ -77,7 +77,7 @@ impl ArmSpec {
         }
     }
 
-    /// The same, written in a file that stands in `folder`.
+    /// The same, written in a file in `folder`.
     pub(super) fn written_in(&mut self, folder: &Path) {
         if let Self::Urdf(spec) = self {
             spec.urdf = folder.join(&spec.urdf);

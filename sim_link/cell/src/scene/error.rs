@@ -15,7 +15,7 @@ pub enum SceneError {
     Read {
         /// Path as given.
         file: String,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// Not TOML, an unknown field, or a value of the wrong type.
@@ -30,14 +30,14 @@ pub enum SceneError {
         /// What is wrong.
         message: String,
     },
-    /// The file of the arm is missing, is none, or has no such chain.
+    /// The file of the arm is missing, is not a URDF, or has no such chain.
     #[error("robot.model: {why}. Name a built-in arm, or a URDF file with its base and tip links. {place}", place = place(file, *line))]
     Arm {
         /// Path of the scene as given.
         file: String,
         /// Line, counted from 1, where known.
         line: Option<usize>,
-        /// What is wrong with the arm. It stands in the sentence, so it is no source that is reported once more.
+        /// What is wrong with the arm. It is part of the sentence, so it is not reported again as the source.
         why: Box<UrdfError>,
     },
     /// A number out of its range.
@@ -50,7 +50,7 @@ pub enum SceneError {
         /// Dotted name of the field.
         field: String,
         value: String,
-        /// What it must be.
+        /// The valid range.
         need: String,
     },
 }

@@ -1,4 +1,4 @@
-//! How an arm's links differ from those that its controller counts with.
+//! How an arm's links differ from those that its controller uses.
 
 use handeye_arm::{Arm, ArmError, JointKind};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -10,22 +10,22 @@ use super::errors_of_robot::stream_of;
 /// The stream of random numbers that the errors of the links have for themselves.
 const ARM_STREAM: u64 = 4;
 
-/// What is off about one joint, in its frame at rest turned so that the axis is z.
+/// Error of one joint, in its frame at rest turned so that the axis is z.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct JointError {
     /// Direction of the axis: a rotation vector along x and y, radians.
     pub tilt_rad: [f64; 2],
     /// Place of the axis along x and y, metres.
     pub shift_m: [f64; 2],
-    /// What is added to the value that the encoder shows, radians.
+    /// Added to the encoder's value, radians.
     pub zero_rad: f64,
-    /// What is added to it where gravity turns the joint as much as it ever could, radians.
+    /// Added to it under the largest torque that gravity can have on the joint, radians.
     pub compliance_rad: f64,
 }
 
 impl JointError {
-    /// Where the joint really is, with so much more added to its angle, and gravity that turns it with a share of -1 to 1 of
-    /// the largest torque.
+    /// Where the joint really is, with `offset_rad` added to its angle and `gravity` as the torque's share, -1 to 1, of the
+    /// largest torque.
     pub(super) fn displacement(&self, offset_rad: f64, gravity: f64) -> Isometry3<f64> {
         let ([x, y], [about_x, about_y]) = (self.shift_m, self.tilt_rad);
         let tilt = UnitQuaternion::from_scaled_axis(Vector3::new(about_x, about_y, 0.0));
@@ -37,9 +37,9 @@ impl JointError {
 
 /// Draws the errors of an arm.
 ///
-/// The first joint and the zero of the last have none: they would act as another place of the arm and another tool, which
-/// nobody could tell from them, and the true pose of the camera on the tip would be a matter of choice. Every number is drawn
-/// whatever the levels are, so that one level does not change what another draws.
+/// The first joint and the zero of the last have no error: it would be indistinguishable from another place of the arm or
+/// another tool, and the true pose of the camera on the tip would not be unique. Every number is drawn whatever the levels
+/// are, so that one level does not change what another draws.
 pub(super) fn drawn(levels: &ArmErrorsSpec, arm: &Arm, seed: u64) -> Vec<JointError> {
     let mut rng = stream_of(seed, ARM_STREAM);
     let mut normal = |sigma: f64| {
@@ -65,7 +65,7 @@ pub(super) fn drawn(levels: &ArmErrorsSpec, arm: &Arm, seed: u64) -> Vec<JointEr
 /// The torque of gravity about each joint over the largest that it could be, -1 to 1, where every joint and the tip weigh
 /// alike. The largest is what it would be if all behind the joint were stretched out level.
 ///
-/// `down` is the direction of gravity in the frame that the arm stands in.
+/// `down` is the direction of gravity in the arm frame.
 ///
 /// # Errors
 /// [`ArmError`] for values that are not those of this arm.

@@ -89,7 +89,7 @@ fn levels_twice_as_large_put_the_tip_twice_as_far_away() {
     scene.robot.arm_errors =
         ArmErrorsSpec { angle_deg: 2.0 * angle_deg, length_mm: 2.0 * length_mm, compliance_deg: 2.0 * compliance_deg };
     for (twice, once) in errors_mm(&scene.resolve(5).unwrap()).into_iter().zip(once) {
-        // What two angles of 0.1° do together is a few thousandths of what each does.
+        // The combined effect of two angles of 0.1° differs from their sum by a few thousandths.
         assert!((twice / once - 2.0).abs() < 0.05, "{twice} mm and {once} mm");
     }
 }
@@ -144,7 +144,7 @@ fn a_seed_decides_the_arm_and_nothing_else_of_the_scene_changes_with_it() {
     assert_ne!(first.robot_errors.joints, other.robot_errors.joints);
     let joints = first.start_joints;
     assert_eq!(first.true_tip(&joints, 1), again.true_tip(&joints, 1));
-    // Everything random has a stream of its own.
+    // Every random quantity has its own stream.
     let without = exact.resolve(3).unwrap();
     assert_eq!(first.robot_errors.settled(2), without.robot_errors.settled(2));
     let as_without = ResolvedScene { robot_errors: without.robot_errors.clone(), ..first.clone() };
@@ -192,7 +192,7 @@ fn what_is_drawn_has_the_standard_deviations_of_the_scene() {
     for ((sum, stated), of_one_arm) in sums.into_iter().zip(stated).zip([10, 10, 4, 5]) {
         let count = (seeds * of_one_arm) as f64;
         let sigma = (sum / count).sqrt();
-        // Five standard deviations of what so many draws give.
+        // Five standard deviations for this many draws.
         assert!((sigma / stated - 1.0).abs() < 5.0 / (2.0 * count).sqrt(), "{sigma} instead of {stated}");
     }
 }

@@ -14,19 +14,19 @@ const FIRST_STREAM: u64 = 1 << 32;
 
 /// The errors of one robot.
 ///
-/// What the robot *reports* is the nominal kinematics of its encoders: `forward(q)`. Where it really *is* has three
-/// errors more: constant joint offsets, links other than the nominal ones, and a displacement that differs every time it comes
+/// What the robot *reports* is the nominal kinematics of its encoders: `forward(q)`. Where it really *is* differs by three
+/// more errors: constant joint offsets, links other than the nominal ones, and a displacement that differs every time it comes
 /// to rest,
 ///
 /// `true = forward_with_errors(q + joint_offset) * connection_from_tip * exp(settled(n))`
 ///
-/// with the tangent vector `[t; r]` in the tip frame. `n` counts the times that the arm has come to rest: while it
-/// stands still its pose does not change, however often it is asked.
+/// with the tangent vector `[t; r]` in the tip frame. `n` counts the times that the arm has come to rest: while it is
+/// at rest its pose does not change, however often it is read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotErrors {
-    /// What is added to the joint values that the encoders show, radians.
+    /// Added to the joint values of the encoders, radians.
     pub joint_offset_rad: JointValues,
-    /// What is off about each joint.
+    /// Error of each joint.
     pub joints: Vec<JointError>,
     /// 1σ per axis of the displacement, metres.
     pub repeatability_m: f64,
@@ -53,8 +53,8 @@ impl RobotErrors {
         gaussian(self.seed, FIRST_STREAM.wrapping_add(index), self.repeatability_m, self.repeatability_rad)
     }
 
-    /// Where each joint really is, in its frame at rest turned so that the axis is z, with gravity that turns each with a share
-    /// of the largest torque.
+    /// Where each joint really is, in its frame at rest turned so that the axis is z, with `gravity` as each one's share of the
+    /// largest torque.
     pub(super) fn displacements(&self, gravity: &[f64]) -> Vec<Isometry3<f64>> {
         let errors = self.joints.iter().zip(&self.joint_offset_rad).zip(gravity);
         errors.map(|((error, offset_rad), gravity)| error.displacement(*offset_rad, *gravity)).collect()

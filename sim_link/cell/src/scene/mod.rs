@@ -1,4 +1,4 @@
-//! The scene of the built-in cell: what a scene file says, and the truth that follows from it and a seed.
+//! The scene of the built-in cell: what a scene file contains, and the ground truth that follows from it and a seed.
 //!
 //! A scene file is TOML. Every field has a default, and the defaults together are the public UR5 hand-eye scene:
 //! exact, without noise or distortion. Lengths are in metres and angles in degrees where the name does not say
@@ -53,7 +53,7 @@ pub struct Scene {
     pub depth: DepthSpec,
     /// Light and background.
     pub light: LightSpec,
-    /// Boxes that stand around: floor, table, board stand.
+    /// Boxes around the arm: floor, table, board stand.
     pub solids: Vec<SolidSpec>,
 }
 
@@ -139,7 +139,7 @@ impl Scene {
         Ok(resolved::resolve(self, arm, seed))
     }
 
-    /// `find_files` says where what the scene names is.
+    /// `find_files` resolves the files that the scene names.
     fn parse(text: &str, file: &str, find_files: impl FnOnce(&mut ArmSpec)) -> Result<Self, SceneError> {
         let mut scene: Self = toml::from_str(text).map_err(|error| SceneError::syntax(file, text, &error))?;
         find_files(&mut scene.robot.model);

@@ -1,4 +1,4 @@
-//! How a print is off its grid.
+//! Errors of a print relative to its grid.
 
 use rand::Rng;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -20,7 +20,7 @@ pub(super) fn printed(print: &PrintSpec, board: &BoardSpec, rng: &mut impl Rng) 
     let nodes = (columns + 2) * (rows + 2);
     let white: Vec<[f64; 2]> = (0..nodes).map(|_| [normal() * white_squares, normal() * white_squares]).collect();
     let along = [polynomials(columns), polynomials(rows)];
-    // On the outline as at the corner beside it.
+    // On the outline the same as at the adjacent corner.
     let at = |axis: usize, degree: usize, index: i64| {
         let values = &along[axis][degree];
         values[index.clamp(0, values.len() as i64 - 1) as usize]
@@ -41,7 +41,7 @@ pub(super) fn printed(print: &PrintSpec, board: &BoardSpec, rng: &mut impl Rng) 
     })
 }
 
-/// What a line of the grid is displaced by, in squares, where the sheet is a picture of so many pixels.
+/// Displacement of a line of the grid, in squares, where the sheet is a picture of `pixels` pixels.
 fn rounding(line: i64, count: usize, paper_squares: f64, pixels: u32) -> f64 {
     let from_edge = line as f64 - 0.5 * (count as f64 - 1.0) + 0.5 * paper_squares;
     let pixel = paper_squares / f64::from(pixels);

@@ -44,9 +44,9 @@ pub struct ResolvedScene {
     pub far_m: f64,
     /// The arm, from the arm frame (`/UR5`) to the connection, with the ranges of its joints.
     pub arm: Arm,
-    /// Which one it is.
+    /// Which arm it is.
     pub arm_model: ArmSpec,
-    /// What it is called in the tree of objects.
+    /// Its name in the tree of objects.
     pub arm_name: String,
     /// Pose of the arm frame in the world.
     pub world_from_arm: Isometry3<f64>,
@@ -59,21 +59,21 @@ pub struct ResolvedScene {
     pub base_from_target: Pose<Base, Target>,
     /// Pose of the printed sheet (`/Plane`) in the world: origin in its centre, z out of the printed side.
     pub world_from_plane: Isometry3<f64>,
-    /// How it moves from the start of the simulation on.
+    /// How the board moves from the start of the simulation on.
     pub board_motion: BoardMotionSpec,
-    /// That it slips once.
+    /// A single slip of the board.
     pub board_slip: Option<SlipSpec>,
     /// What is printed on it.
     pub target: TargetSpec,
-    /// How the print is off that; `None` for an exact one.
+    /// Errors of the print; `None` for an exact one.
     pub print: Option<Arc<PrintErrors>>,
     /// Size of the sheet along x and y of the plane, metres.
     pub paper_m: [f64; 2],
     /// Joint values at the start, radians; of a prismatic joint metres.
     pub start_joints: JointValues,
-    /// What moves them.
+    /// What moves the joints.
     pub joint_mode: JointModeSpec,
-    /// How far from its target a dynamic joint comes to rest at most, radians; of a prismatic joint metres.
+    /// How far from its target a dynamic joint comes to rest at most, radians, or metres for a prismatic joint.
     pub rest_error: f64,
     /// Errors of the arm.
     pub robot_errors: RobotErrors,
@@ -83,7 +83,7 @@ pub struct ResolvedScene {
     pub depth: DepthSpec,
     /// Light and background.
     pub light: LightSpec,
-    /// What stands around.
+    /// Obstacles around the arm.
     pub solids: Vec<ResolvedSolid>,
 }
 
@@ -122,7 +122,7 @@ impl ResolvedScene {
     }
 
     /// Where each joint really is with these values of the encoders, in its frame at rest turned so that the axis is z
-    /// ([`handeye_arm::Joint::joint_from_axis`]): by joint offsets and the errors of the links.
+    /// ([`handeye_arm::Joint::joint_from_axis`]): with joint offsets and link errors.
     ///
     /// # Errors
     /// As [`Self::reported_tip`].
@@ -132,7 +132,7 @@ impl ResolvedScene {
         Ok(self.robot_errors.displacements(&gravity))
     }
 
-    /// What its sensors do to an image and to depth.
+    /// What its sensors do to colour and depth images.
     pub fn imaging(&self) -> Imaging {
         let (image, depth) = (&self.image, &self.depth);
         Imaging {
@@ -155,7 +155,7 @@ impl ResolvedScene {
         Light { source, ambient: ambient as f32, diffuse: diffuse as f32 }
     }
 
-    /// What is seen where nothing is.
+    /// Colour of the background, where no object is seen.
     pub fn background(&self) -> [f32; 3] {
         self.light.background.map(|c| f32::from(c) / 255.0)
     }

@@ -16,7 +16,8 @@ pub enum ShippedScene {
     Reference,
     /// The same cell with the faults of a good real one: a lens, a little noise, a robot that repeats to 0.05 mm.
     Realistic,
-    /// The realistic cell with a robot that repeats well and whose links are off the nominal ones as those of a usual arm.
+    /// The realistic cell with a robot that repeats well and whose links differ from the nominal ones like those of a
+    /// usual arm.
     Nominal,
     /// The realistic cell with a board that moves in a circle, and images that come as fast as a camera's.
     Tracking,
@@ -33,7 +34,7 @@ impl ShippedScene {
     pub const ALL: [Self; 7] =
         [Self::Reference, Self::Realistic, Self::Nominal, Self::Coppeliasim, Self::Tracking, Self::Panda, Self::Xarm6];
 
-    /// The name by which it is asked for: that of its file.
+    /// The name for selecting it: that of its file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Reference => "reference",
@@ -76,7 +77,7 @@ impl ShippedScene {
     }
 }
 
-/// Which scene the built-in cell has: one that comes with the program, by its name, or a file.
+/// The scene of the built-in cell: one that comes with the program, by its name, or a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(from = "String", into = "String")]
 pub enum SceneChoice {
@@ -145,7 +146,7 @@ mod tests {
 
     use super::*;
 
-    /// What is built in is what stands in the files, which people read and change.
+    /// What is built in is the text of the files, which people read and change.
     #[test]
     fn a_shipped_scene_stands_the_same_cell_as_its_file() {
         for shipped in ShippedScene::ALL {

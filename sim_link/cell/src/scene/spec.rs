@@ -1,4 +1,4 @@
-//! What can be written into a scene file, with the defaults of the reference scene.
+//! The contents of a scene file, with the defaults of the reference scene.
 
 use handeye_geometry::camera::Distortion;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
@@ -18,7 +18,7 @@ const HALF_SQRT: f64 = std::f64::consts::FRAC_1_SQRT_2;
 pub struct PoseSpec {
     /// Origin, metres.
     pub position_m: [f64; 3],
-    /// Unit quaternion x, y, z, w; a length within a thousandth of one is taken for rounding and normalised.
+    /// Unit quaternion x, y, z, w; a length within a thousandth of one counts as rounding and is normalised.
     pub rotation_xyzw: [f64; 4],
 }
 
@@ -72,9 +72,9 @@ pub enum JointModeSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RobotSpec {
-    /// Which one it is.
+    /// Which arm it is.
     pub model: ArmSpec,
-    /// What it is called in the tree of objects: `/UR5` if absent, whatever arm it is.
+    /// Its name in the tree of objects: `/UR5` if absent, whatever arm it is.
     pub name: String,
     /// Pose of the arm frame (`/UR5`, of CoppeliaSim's model 14.65 mm above its mounting plane) in the world.
     pub arm: PoseSpec,
@@ -82,7 +82,7 @@ pub struct RobotSpec {
     pub tip: PoseSpec,
     /// Joint values at the start, one for each joint.
     pub start_joints_deg: JointValues,
-    /// What moves them.
+    /// What moves the joints.
     pub joint_mode: JointModeSpec,
     /// How far from its target a dynamic joint comes to rest, at most; another value at each target, as under load.
     pub rest_error_deg: f64,
@@ -92,14 +92,14 @@ pub struct RobotSpec {
     /// Largest joint values; those that the arm comes with if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_joints_deg: Option<JointValues>,
-    /// How far the arm really stops from the same place each time: 1σ per axis, millimetres.
+    /// How far from the same place the arm really stops each time: 1σ per axis, millimetres.
     pub repeatability_mm: f64,
     /// The same for rotation: 1σ per axis, degrees.
     pub repeatability_deg: f64,
     /// Constant difference between true and reported joint values: what a kinematic calibration would find. None if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joint_offset_deg: Option<JointValues>,
-    /// How far the links are off those that the controller counts with. Drawn once from the seed.
+    /// Errors of the links relative to those that the controller uses. Drawn once from the seed.
     pub arm_errors: ArmErrorsSpec,
 }
 
@@ -107,19 +107,19 @@ pub struct RobotSpec {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArmErrorsSpec {
-    /// Of the direction of an axis about either axis across it, and of a joint's zero, degrees.
+    /// Direction of an axis, about either axis across it, and a joint's zero, degrees.
     pub angle_deg: f64,
-    /// Of the place of an axis along either axis across it, millimetres.
+    /// Position of an axis, along either axis across it, millimetres.
     pub length_mm: f64,
-    /// Of what a joint gives way by where gravity turns it as much as it ever could, degrees.
+    /// Deflection of a joint under the largest torque that gravity can have on it, degrees.
     pub compliance_deg: f64,
 }
 
 impl ArmErrorsSpec {
-    /// A usual arm whose controller counts with the drawing's links. The factory calibrations of 17 arms of Universal Robots
-    /// have medians of 0.03 to 0.17° and 0.03 to 0.4 mm a number.
+    /// A usual arm whose controller uses the drawing's links. The factory calibrations of 17 arms of Universal Robots have
+    /// medians of 0.03 to 0.17° and 0.03 to 0.4 mm a number.
     pub const NOMINAL: Self = Self { angle_deg: 0.07, length_mm: 0.25, compliance_deg: 0.02 };
-    /// Links that are what the controller counts with.
+    /// Links that are exactly those of the controller.
     pub const NONE: Self = Self { angle_deg: 0.0, length_mm: 0.0, compliance_deg: 0.0 };
 }
 
@@ -228,12 +228,12 @@ pub struct BoardSpec {
     pub random_offset_mm: f64,
     /// Random rotation of the sheet: 1σ per axis, degrees. Drawn once from the seed.
     pub random_offset_deg: f64,
-    /// How it moves from the start of the simulation on.
+    /// How the board moves from the start of the simulation on.
     pub motion: BoardMotionSpec,
-    /// That it slips once; it does not by default.
+    /// A single slip of the board; none by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slip: Option<SlipSpec>,
-    /// How its corners are off the grid; they are not by default.
+    /// Displacements of its corners from the grid; none by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub print: Option<PrintSpec>,
 }
@@ -242,7 +242,7 @@ pub struct BoardSpec {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PrintSpec {
-    /// The sheet is a picture of so many pixels along x and y: each line of the grid stands between two of them.
+    /// Number of pixels of the sheet's picture along x and y: each line of the grid is between two of them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bitmap_px: Option<[u32; 2]>,
     /// Displacement of each corner by itself: 1σ per axis, millimetres.
@@ -252,14 +252,13 @@ pub struct PrintSpec {
     pub smooth_mm: f64,
 }
 
-/// A board that is knocked or sags: it moves once, while nobody looks.
+/// A board that is knocked or sags: it moves once, unobserved.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SlipSpec {
-    /// It has moved when the arm comes to rest for this time, counted from 1; where the arm stands at the start does
-    /// not count.
+    /// Number of the stop of the arm at which it has moved, counted from 1; the place at the start does not count.
     pub at_stop: u64,
-    /// How far, along x, y and z of the sheet, millimetres.
+    /// Displacement along x, y and z of the sheet, millimetres.
     pub by_mm: [f64; 3],
 }
 
@@ -312,8 +311,8 @@ pub struct DepthSpec {
     /// Depth that is added on slanted surfaces, in parts of what depth changes by from one pixel to the next: OpenGL's
     /// polygon offset. CoppeliaSim has 0.475.
     pub offset_px: f64,
-    /// What is reported where nothing is seen, metres; `far_m` of the camera if absent. CoppeliaSim reports 3.5000184 for
-    /// a far plane of 3.5 m.
+    /// Depth reported where nothing is seen, metres; `far_m` of the camera if absent. CoppeliaSim reports 3.5000184 for a
+    /// far plane of 3.5 m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nothing_m: Option<f64>,
 }

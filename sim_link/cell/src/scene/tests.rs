@@ -147,7 +147,7 @@ fn from_every_taught_pose_the_whole_board_is_seen_from_the_front_and_most_show_i
 #[test]
 fn the_realistic_scene_shows_the_whole_board_from_every_taught_pose_whatever_the_seed() {
     let scene = Scene::realistic().unwrap();
-    // Room for a detector that looks at the surroundings of a corner.
+    // Margin for a detector that uses the surroundings of a corner.
     let margin = 5.0;
     for seed in 0..200 {
         let resolved = scene.resolve(seed).unwrap();
@@ -365,7 +365,7 @@ fn a_scene_made_in_code_is_checked_too() {
     assert!(scene.resolve(1).is_err());
 }
 
-/// What data sets say of the arm of the cell, and how the tip turns with its joints, is what the cell does.
+/// The arm of the cell in data sets, and the rotation of the tip by its joints, agree with the cell.
 #[test]
 fn the_arm_of_data_sets_is_the_arm_of_the_cell_and_an_offset_of_a_joint_turns_the_tip_by_its_twist() {
     let mut scene = Scene::realistic().unwrap();

@@ -1,4 +1,4 @@
-//! What the planner of views has to know, of a simulated cell.
+//! What the planner of views needs to know about a simulated cell.
 
 use handeye_arm::ArmKind;
 use handeye_plan::{Arm, ArmBody, Carried, Obstacle, Surroundings, ViewSetup};

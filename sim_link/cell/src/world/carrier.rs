@@ -20,7 +20,7 @@ const MAX_LEGS: usize = 16;
 #[derive(Debug, Clone)]
 pub struct Carrier {
     object: Handle,
-    /// What every simulation begins with.
+    /// The course at the start of every simulation.
     first: Course,
     legs: Vec<Leg>,
     placed: Option<Placed>,
@@ -36,7 +36,7 @@ struct Leg {
     braking_from: Option<u64>,
 }
 
-/// What the carrier did last.
+/// The last placement by the carrier.
 #[derive(Debug, Clone)]
 struct Placed {
     /// The object's local pose without the courses.
@@ -75,7 +75,7 @@ impl Carrier {
 
     /// Goes over to another course, which begins where the object is.
     pub fn follow(&mut self, course: Course) {
-        // What has not begun has moved nothing.
+        // A course that has not begun has moved nothing.
         self.legs.retain(|leg| leg.passes > 0);
         for leg in &mut self.legs {
             leg.braking_from.get_or_insert(leg.passes);

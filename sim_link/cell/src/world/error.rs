@@ -1,4 +1,4 @@
-//! What the world refuses, in the words that the simulator's own API uses.
+//! Errors of the world, in the words of the simulator's own API.
 
 /// A refused operation on the world.
 ///

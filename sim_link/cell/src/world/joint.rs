@@ -1,6 +1,6 @@
 //! Joints: position, range, and the motion towards a target position.
 //!
-//! Where a name says radians they are metres of a prismatic joint.
+//! Where a name says radians, the unit is metres for a prismatic joint.
 
 use std::f64::consts::{PI, TAU};
 
@@ -20,9 +20,10 @@ const DEFAULT_LIMITS: DriveLimits = [PI / 2.0, TAU, TAU];
 /// published.
 const PER_SPEED: [f64; 2] = [4.0, 4.0];
 
-/// A kinematic joint that is sent to where it nearly stands is not moved by the simulator's main script \[rad\].
+/// A kinematic joint that is within this of its target is not moved by the simulator's main script \[rad\].
 const STANDS_WITHIN_RAD: f64 = 0.01 * PI / 180.0;
-/// The same of a prismatic joint \[m\]. Nobody has measured it; it is as far as the tip of an arm of 0.1 m goes by the above.
+/// The same for a prismatic joint \[m\]. It has not been measured; it is as far as the tip of an arm of 0.1 m goes by the
+/// above.
 const STANDS_WITHIN_M: f64 = 0.02e-3;
 
 /// A dynamic joint lags behind a steady target by its velocity times this \[s\].
@@ -45,21 +46,22 @@ pub enum JointMode {
 enum Drive {
     /// It is on its way.
     Moving(Box<JointMotion>),
-    /// It stood at its target already, so that nothing moves it there and the motion never ends: positions are refused
-    /// until another target has moved it, as CoppeliaSim does since 4.7.
+    /// It was at its target already, so nothing moves it and the motion never ends: positions are refused until another
+    /// target has moved it, as CoppeliaSim does since 4.7.
     Stuck,
 }
 
 /// A joint without mass.
 #[derive(Debug, Clone)]
 pub struct Joint {
-    /// Whether it turns or shifts what it carries.
+    /// Whether it turns or shifts its children.
     pub kind: JointKind,
     /// Whether it turns without end; its position is then in (−π, π].
     pub cyclic: bool,
     /// What moves it.
     pub mode: JointMode,
-    /// How far from its target it comes to rest at most where it is dynamic, as under a load that depends on where it is.
+    /// Largest distance from its target at which a dynamic joint comes to rest, as under a load that depends on the
+    /// position.
     pub rest_error: f64,
     min_rad: f64,
     max_rad: f64,
@@ -86,7 +88,7 @@ impl Joint {
         joint
     }
 
-    /// What it does to what it carries: a turn about z or a shift along it.
+    /// The motion of its children: a turn about z or a shift along it.
     pub fn motion(&self, value: f64) -> Isometry3<f64> {
         match self.kind {
             JointKind::Revolute => super::turn_z(value),
@@ -112,12 +114,12 @@ impl Joint {
         }
     }
 
-    /// What its encoder says, radians.
+    /// Encoder value, radians.
     pub fn position_rad(&self) -> f64 {
         self.position_rad
     }
 
-    /// Where it was last sent, radians.
+    /// Its last target, radians.
     pub fn target_rad(&self) -> f64 {
         self.target_rad
     }
@@ -132,7 +134,7 @@ impl Joint {
         (self.min_rad, self.max_rad)
     }
 
-    /// Whether a target position was set that it has not been moved to: a kinematic joint refuses positions then.
+    /// Whether it still has a target position to be moved to: a kinematic joint refuses positions then.
     pub(crate) fn is_driven(&self) -> bool {
         self.drive.is_some()
     }
@@ -210,7 +212,7 @@ impl Joint {
         let Some(Drive::Moving(drive)) = self.drive.take() else { return };
         let [max_vel, max_accel, max_jerk] = self.limits;
         let state = drive.at(drive.time_s()).state();
-        // The state comes from a motion within the same limits, so a profile exists; without one, standing still is
+        // The state comes from a motion within the same limits, so a profile exists; without one, staying at rest is
         // the safe answer.
         let stop = JointMotion::stop(state, &MotionLimits::uniform(1, max_vel, max_accel, max_jerk)).ok();
         self.target_rad = stop

@@ -1,6 +1,6 @@
 //! The world of the cell: an object tree and a simulation that advances it in passes. No sockets, no clock.
 //!
-//! The robot exists twice. Clients see it as its controller does ([`Chain::Reported`]); cameras see it as it stands
+//! The robot exists twice. Clients see it as its controller does ([`Chain::Reported`]); cameras see it as it really is
 //! ([`Chain::Actual`]), with whatever errors the scene gives its joints.
 
 pub mod carrier;
@@ -26,13 +26,13 @@ pub use sensor::{Moment, Reported, Shown, VisionSensor};
 pub use simulation::{Simulation, State};
 pub use tree::{Chain, Kind, Object, Tree, turn_z};
 
-/// The faults of a robot: how it really stands, given how it believes to stand.
+/// The faults of a robot: where it really is, given where its controller believes it to be.
 pub trait Faults: std::fmt::Debug + Send {
     /// Sets the displacements of the objects. Called once per pass, after the joints have moved.
     fn apply(&mut self, tree: &mut Tree);
 }
 
-/// Which sensors are to take in what there is to see.
+/// Which sensors take an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sensors {
     /// One that the simulation leaves alone.
@@ -114,7 +114,8 @@ impl World {
         self.simulation.stop();
     }
 
-    /// Runs the rest of a pass: joints on their way and what is carried move on, sensors take in what there is to see, time advances.
+    /// Runs the rest of a pass: joints on their way and what is carried move on, sensors take in what there is to see, time
+    /// advances.
     /// Nothing happens unless the simulation is advancing.
     pub fn run_pass(&mut self) {
         if !self.simulation.is_advancing() {
@@ -183,7 +184,7 @@ impl World {
         }
     }
 
-    /// Where everything that can see or be seen really is. The moment is the same one as long as nothing of that has
+    /// Where everything that can see or be seen really is. The moment is the same one as long as none of these has
     /// moved, so that what was computed from it stays valid; dummies come and go unseen.
     fn look(&mut self, time_s: f64) -> Shown {
         let poses: Vec<(Handle, Isometry3<f64>)> = self

@@ -34,7 +34,7 @@ struct Search<'a> {
     comparisons: usize,
 }
 
-/// Finds the object at `path`, the `index`-th of several (`None`: the first, or what a trailing `{n}` says).
+/// Finds the object at `path`, the `index`-th of several (`None`: the first, or the one that a trailing `{n}` gives).
 ///
 /// `proxy` is where `.` and `:` start from.
 ///
@@ -119,7 +119,7 @@ fn parse_start<'a>(tree: &Tree, path: &'a str, proxy: Option<Handle>) -> Option<
     }
     let (mut first, mut rest) = split_first_segment(path);
     let Some(proxy) = proxy else {
-        // A remote client is no object: its own children are the scene's, but it is no object itself.
+        // A remote client is not an object: its children are the scene's, but it is not an object itself.
         return (first == "." && !rest.is_empty()).then_some((Start::Scene, rest));
     };
     let mut at = match first {
@@ -183,7 +183,7 @@ fn matches_wildcards(pattern: &str, name: &str) -> bool {
     let pattern: Vec<char> = pattern.chars().collect();
     let name: Vec<char> = name.chars().collect();
     let (mut p, mut n) = (0, 0);
-    // Where the latest star stands, and how much of the name it has swallowed.
+    // Position of the last star, and how much of the name it has matched.
     let mut star: Option<(usize, usize)> = None;
     while n < name.len() {
         if p < pattern.len() && pattern[p] == '*' {

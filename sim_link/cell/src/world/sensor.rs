@@ -7,12 +7,12 @@ use nalgebra::Isometry3;
 
 use crate::world::handle::Handle;
 
-/// Where everything was at one sensing phase, as the robot really stood.
+/// Where everything was at one sensing phase, with the robot where it really was.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Moment {
     /// `world_from_object` of everything that can see or be seen.
     pub poses: Vec<(Handle, Isometry3<f64>)>,
-    /// What of that was not to be seen, in ascending order.
+    /// Objects that were hidden, in ascending order.
     pub hidden: Vec<Handle>,
 }
 
@@ -23,13 +23,13 @@ impl Moment {
         self.poses.binary_search_by_key(&handle, |(h, _)| *h).ok().map(|index| &self.poses[index].1)
     }
 
-    /// Where an object was, if it was to be seen.
+    /// Where an object was, if it was visible.
     pub fn seen(&self, handle: Handle) -> Option<&Isometry3<f64>> {
         self.pose(handle).filter(|_| self.hidden.binary_search(&handle).is_err())
     }
 }
 
-/// How the robot's controller had the robot at one sensing phase.
+/// Where the robot was at one sensing phase by its controller.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reported {
     /// Positions of the joints from the base up, radians.
@@ -38,12 +38,12 @@ pub struct Reported {
     pub world_from_tip: Isometry3<f64>,
 }
 
-/// What a sensor's buffers show.
+/// Contents of a sensor's buffers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shown {
     /// Simulation pass that it was taken in, counted over the life of the world: every pass has its own image noise.
     pub pass: u64,
-    /// Simulated time, seconds: what the clock says once that pass is over.
+    /// Simulated time at the end of that pass, seconds.
     pub time_s: f64,
     /// The robot at that time; `None` if there was none.
     pub reported: Option<Reported>,
@@ -66,7 +66,7 @@ pub struct VisionSensor {
     pub ignore_depth: bool,
     /// Refreshed on request only, not by the simulation.
     pub explicit: bool,
-    /// What the buffers show; `None` before the first pass and after the end of a simulation.
+    /// Contents of the buffers; `None` before the first pass and after the end of a simulation.
     pub(super) shown: Option<Shown>,
 }
 
@@ -86,7 +86,7 @@ impl VisionSensor {
         2.0 * (f64::from(side) / 2.0 / focal).atan()
     }
 
-    /// What the buffers show.
+    /// Contents of the buffers.
     pub fn shown(&self) -> Option<&Shown> {
         self.shown.as_ref()
     }

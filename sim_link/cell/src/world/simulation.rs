@@ -15,9 +15,9 @@ const TIME_STEPS_S: std::ops::RangeInclusive<f64> = 1e-4..=1.0;
 /// State of the simulation, with the API's numbers. Those from 16 on are the advancing ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
-    /// Nothing moves, time stands at its last value.
+    /// Nothing moves, time stays at its last value.
     Stopped = 0,
-    /// Between two passes for as long as somebody wants.
+    /// Between two passes, until it is resumed.
     Paused = 8,
     /// The first pass is under way.
     FirstAfterStop = 16,
@@ -27,7 +27,7 @@ pub enum State {
     LastBeforePause = 19,
     /// The first pass after a pause.
     FirstAfterPause = 20,
-    /// A stop was asked for.
+    /// A stop was requested.
     AboutToStop = 21,
     /// The last pass.
     LastBeforeStop = 22,
@@ -83,7 +83,7 @@ impl Simulation {
         self.time_s
     }
 
-    /// What [`Self::time_s`] is once the pass under way is over.
+    /// [`Self::time_s`] at the end of the pass under way.
     pub(super) fn time_after_pass_s(&self) -> f64 {
         self.time_s + self.time_step_s
     }
@@ -109,7 +109,7 @@ impl Simulation {
     }
 
     /// Starts from stopped, remembering where everything is, or resumes from a pause. In any other state it only
-    /// takes back a pause that was asked for.
+    /// cancels a requested pause.
     pub(super) fn start(&mut self, tree: &Tree) {
         match self.state {
             State::Stopped => {

@@ -18,12 +18,12 @@ pub(crate) const MAX_OBJECTS: usize = 10_000;
 /// Nesting that a world takes, which bounds every recursion over the tree.
 pub const MAX_DEPTH: usize = 128;
 
-/// Which of the two robots a pose is asked of.
+/// Which of the two robots a pose is read from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Chain {
     /// The robot as its controller believes it to be: encoder angles through the nominal geometry.
     Reported,
-    /// The robot as it stands: with joint offsets and positioning noise. This is what cameras see.
+    /// The robot as it really is: with joint offsets and positioning noise. This is what cameras see.
     Actual,
 }
 
@@ -63,7 +63,7 @@ pub struct Object {
     /// Name, not unique.
     pub alias: String,
     pub kind: Kind,
-    /// Whether it is the base of a model, which `:` in a path looks for.
+    /// Whether it is the base of a model, which `:` in a path searches for.
     pub model_base: bool,
     /// Not seen by any camera from the next pass on; what hangs on it is.
     pub hidden: bool,
@@ -368,7 +368,7 @@ fn placed(object: &Object, chain: Chain) -> Isometry3<f64> {
     }
 }
 
-/// What a joint adds between its base frame and what hangs on it.
+/// Transform from a joint's base frame to its children.
 fn turn(object: &Object) -> Isometry3<f64> {
     match &object.kind {
         Kind::Joint(joint) => joint.motion(joint.position_rad()),

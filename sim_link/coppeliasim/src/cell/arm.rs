@@ -31,12 +31,12 @@ const LONGEST_NUDGE: Duration = Duration::from_secs(5);
 /// The built-in cell's function that brakes every motion.
 const STOP_FUNCTION: &str = "handeye.stop";
 
-/// How far from its goal a tip may stop.
+/// Largest distance of a tip from its goal after a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionTolerance {
-    /// Of the position, metres.
+    /// Distance, metres.
     pub distance_m: f64,
-    /// Of the orientation, radians.
+    /// Angle, radians.
     pub angle_rad: f64,
 }
 
@@ -47,14 +47,14 @@ impl Default for MotionTolerance {
     }
 }
 
-/// When an arm counts as standing still.
+/// When an arm counts as at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SettleOptions {
     /// Fastest joint (rad/s) that counts as at rest; one that shifts over [`super::RAD_PER_M`] of it (m/s).
     pub rate_rad_s: f64,
     /// Longest wait, in simulated time (s).
     pub limit_s: f64,
-    /// Longest wait in real time, for a simulation whose time stands, runs backwards or hardly goes on.
+    /// Longest wait in real time, for a simulation whose time stops, runs backwards or hardly advances.
     pub longest: Duration,
 }
 
@@ -66,12 +66,12 @@ impl Default for SettleOptions {
     }
 }
 
-/// The arm of a cell, over a connection of its own.
+/// The arm of a cell, over its own connection.
 pub struct Arm {
     pub(super) sim: Sim,
     pub(super) objects: Arc<CellObjects>,
     pub(super) info: Arc<CellInfo>,
-    /// What its motions keep clear of.
+    /// Obstacles that its motions avoid.
     pub(super) among: Option<Arc<Among>>,
 }
 
@@ -123,14 +123,14 @@ impl Arm {
     /// See [`super::CameraFeed::ground_truth`].
     ///
     /// # Errors
-    /// As there.
+    /// As for [`super::CameraFeed::ground_truth`].
     pub fn ground_truth(&mut self) -> Result<GroundTruth, LinkError> {
         truth::read(&mut self.sim, &self.objects, &self.info)
     }
 
     /// Brings the arm to rest, whoever moves it: the built-in cell brakes every motion within its limits. CoppeliaSim has
-    /// no such call; there a joint that a target position moves is told to stay where it is now. A joint that is put from
-    /// place to place stands as soon as nobody does so, and is left alone.
+    /// no such call; there a joint that a target position moves gets its present position as the target. A joint whose
+    /// positions are set directly is at rest as soon as no client sets them, and is left alone.
     ///
     /// # Errors
     /// Any [`LinkError`] of a call; the arm may then still move.
@@ -150,10 +150,10 @@ impl Arm {
         Ok(())
     }
 
-    /// Where the joints stand, each of them ready to be put elsewhere.
+    /// Where the joints are, each of them ready to be moved.
     ///
     /// A kinematic joint that was sent to a target position refuses any other until it has been moved there, and one that
-    /// stood there already is never moved: a script, or a client that stopped it, leaves an arm that reports success
+    /// was there already is never moved: a script, or a client that stopped it, leaves an arm that reports success
     /// without moving, until the simulation ends.
     ///
     /// # Errors
@@ -202,8 +202,8 @@ impl Arm {
         }
     }
 
-    /// Waits until the arm stands still, and one complete pass longer, so that images show it so. Returns the simulated
-    /// time that it took (s).
+    /// Waits until the arm is at rest, and one complete pass longer, so that images show it at rest. Returns the
+    /// simulated time that it took (s).
     ///
     /// # Errors
     /// [`LinkError::NotSettled`] after `options.limit_s` of simulated time; [`LinkError::WaitedTooLong`] after
@@ -240,7 +240,8 @@ impl Arm {
             if resting >= RESTING_PASSES {
                 return Ok(after_s);
             }
-            // A simulation that runs faster than it is asked may be past the limit at the first look, and at rest for long.
+            // A simulation that runs faster than it is polled may be past the limit at the first check, and at rest for
+            // long.
             looks += 1;
             if resting == 0 && looks > RESTING_PASSES && after_s > options.limit_s {
                 let kind = self.kind(fastest);
@@ -251,7 +252,7 @@ impl Arm {
     }
 }
 
-/// What is waited for when simulated time stands.
+/// What is waited for when simulated time does not advance.
 pub(super) fn clock_past(now_s: f64) -> String {
     format!("simulated time to go on from {now_s:.3} s")
 }

@@ -18,10 +18,10 @@ const MOVE_FUNCTION: &str = "handeye.moveBoard";
 /// The cell's function that hides the board and shows it again.
 const SHOW_FUNCTION: &str = "handeye.showBoard";
 
-/// How the board is to move. What is not given is as the cell has it: 0.1 m/s, 0.04 m, 3°, the seed of the cell.
+/// How the board is to move. Defaults of the cell: 0.1 m/s, 0.04 m, 3°, the seed of the cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoardMotion {
-    /// The shape of the path, around where the board stands; [`BoardPath::Still`] brings it to rest.
+    /// The shape of the path, around where the board is; [`BoardPath::Still`] brings it to rest.
     pub path: BoardPath,
     /// Mean speed along the path [m/s], from 0.001 to 1 and at most 20/s times the size.
     pub speed_m_s: f64,
@@ -29,12 +29,12 @@ pub struct BoardMotion {
     pub size_m: Option<f64>,
     /// Largest angle by which the board is turned on its way [°], from 0 to 30.
     pub tilt_deg: Option<f64>,
-    /// What is random in it.
+    /// Seed of the random parts of the path.
     pub seed: Option<u64>,
 }
 
 impl BoardMotion {
-    /// Along a path at a speed [m/s], with all else as the cell has it.
+    /// Along a path at a speed [m/s], with the cell's defaults for the rest.
     pub fn along(path: BoardPath, speed_m_s: f64) -> Self {
         Self { path, speed_m_s, size_m: None, tilt_deg: None, seed: None }
     }
@@ -42,7 +42,7 @@ impl BoardMotion {
     fn to_value(self) -> Value {
         let Self { path, speed_m_s, size_m, tilt_deg, seed } = self;
         let mut fields = vec![("path", Value::from(path.name()))];
-        // Nothing that stands has a speed, whatever number is here.
+        // A board at rest has no speed, whatever number is given.
         if path != BoardPath::Still {
             fields.push(("speed_m_s", Value::Float(speed_m_s)));
         }
@@ -54,12 +54,12 @@ impl BoardMotion {
 }
 
 impl Arm {
-    /// Has the board go along a path from where it stands, without a jump in position or velocity (but for
+    /// Moves the board along a path from where it is, without a jump in position or velocity (except for
     /// [`BoardPath::Step`]). The end of the simulation puts it back.
     ///
     /// # Errors
-    /// [`LinkError::Unsupported`] on a server that is no built-in cell; [`LinkError::Remote`] names the number that is
-    /// out of its range.
+    /// [`LinkError::Unsupported`] on a server that is not a built-in cell; [`LinkError::Remote`] names the number that
+    /// is out of its range.
     pub fn move_board(&mut self, motion: &BoardMotion) -> Result<(), LinkError> {
         self.call_board(MOVE_FUNCTION, motion.to_value())
     }
@@ -67,13 +67,13 @@ impl Arm {
     /// Hides the board from the camera or shows it again, from the next pass on.
     ///
     /// # Errors
-    /// [`LinkError::Unsupported`] on a server that is no built-in cell.
+    /// [`LinkError::Unsupported`] on a server that is not a built-in cell.
     pub fn show_board(&mut self, is_shown: bool) -> Result<(), LinkError> {
         self.call_board(SHOW_FUNCTION, Value::from(is_shown))
     }
 
-    /// Where the scene has the board, taken to lie on its sheet as that of the public scene does. `None` where the scene has
-    /// none of the name that it is known by.
+    /// Pose of the board in the scene, assumed to be on its sheet as in the public scene. `None` where the scene has no
+    /// object of the board's name.
     ///
     /// # Errors
     /// Any [`LinkError`] of the call.

@@ -30,8 +30,8 @@ pub struct Frame {
     pub depth: DepthImage,
     /// Simulated time (s).
     pub sim_time_s: f64,
-    /// How much older than pose and joints the images may be (s of simulated time): nothing where all of it is of one
-    /// instant. An arm at rest for longer than that is in the images where it is.
+    /// How much older than pose and joints the images may be (s of simulated time): zero where all of it is of one
+    /// instant. Images of an arm at rest for longer than that show it where it is.
     pub image_age_s: f64,
     /// The tip as the controller reports it.
     pub base_from_tip: Pose<Base, Tip>,
@@ -41,14 +41,14 @@ pub struct Frame {
     pub base_from_target_true: Option<Pose<Base, Target>>,
 }
 
-/// The camera of a cell, over a connection of its own.
+/// The camera of a cell, over its own connection.
 pub struct CameraFeed {
     sim: Sim,
     objects: Arc<CellObjects>,
     info: Arc<CellInfo>,
     /// Whether the server takes images on request, as far as is known.
     renews: bool,
-    /// Whether the server tells what its images show, as far as is known.
+    /// Whether the server reports the moment that its images show, as far as is known.
     tells_moment: bool,
 }
 
@@ -81,28 +81,27 @@ impl CameraFeed {
     ///
     /// The simulation is held for the few milliseconds that it takes, and has its sensors take their images meanwhile:
     /// the simulator does so at the end of a pass, and answers at the beginning of the next, so a joint that was put
-    /// elsewhere since is in the pose and not yet in the image. A built-in cell tells instead what it was that the images
-    /// of the last pass show, board included, and all of the frame is of the end of that pass.
+    /// elsewhere since is in the pose and not yet in the image. A built-in cell reports instead the moment that the
+    /// images of the last pass show, board included, and the whole frame is of the end of that pass.
     ///
-    /// Where images cannot be asked for, [`Frame::image_age_s`] says how much older than the pose they may be.
+    /// Where images cannot be requested, [`Frame::image_age_s`] gives how much older than the pose they may be.
     ///
     /// # Errors
-    /// [`LinkError::MixedInstants`] when another client moves the arm meanwhile, again and again; otherwise as for any
-    /// call.
+    /// [`LinkError::MixedInstants`] when another client moves the arm meanwhile, repeatedly; otherwise as for any call.
     pub fn grab(&mut self) -> Result<Frame, LinkError> {
         let held = Held::acquire(&mut self.sim)?;
         let outcome = self.read_held();
         held.release(&mut self.sim, outcome)
     }
 
-    /// All of one instant while time stands. Requests of other clients are served meanwhile, so one that moves the arm may
-    /// put a joint elsewhere between image and pose: then it is done once more.
+    /// All of one instant while simulated time is held. Requests of other clients are served meanwhile, so one that moves
+    /// the arm may move a joint between image and pose: then it is done again.
     fn read_held(&mut self) -> Result<Frame, LinkError> {
         for _ in 0..ATTEMPTS {
             let before = if self.renews { Some(self.base_from_tip()?) } else { None };
             let image_age_s = self.renew()?;
             let frame = self.read(image_age_s)?;
-            // Images that cannot be asked for, or that come with what they show, are as old as they say.
+            // Images that cannot be requested, or that come with their moment, are as old as reported.
             let Some(before) = before.filter(|_| self.renews) else { return Ok(frame) };
             if frame.base_from_tip == before && self.base_from_tip()? == before {
                 return Ok(frame);
@@ -126,7 +125,7 @@ impl CameraFeed {
                 outcome => return outcome.map(|()| 0.0),
             }
         }
-        // A cell that says what its images show says so of pose and joints at the same instant.
+        // A cell that reports the moment of its images reports pose and joints of the same instant.
         Ok(if self.tells_moment { 0.0 } else { self.info.time_step_s })
     }
 
@@ -143,7 +142,8 @@ impl CameraFeed {
         })
     }
 
-    /// The robot and the time that the newest images show, from a cell that says so; `None` where they show nothing yet.
+    /// The robot and the time that the newest images show, from a cell that reports them; `None` where they show nothing
+    /// yet.
     pub fn shown(&mut self) -> Result<Option<ShownMoment>, LinkError> {
         if !self.tells_moment {
             return Ok(None);
@@ -169,8 +169,8 @@ impl CameraFeed {
         })
     }
 
-    /// Where the camera of a simulated cell really is and what it really does. For comparison with a result; a solver
-    /// that sees this is worth nothing.
+    /// True pose and intrinsics of the camera of a simulated cell. For comparison with a result; never an input of a
+    /// solver.
     ///
     /// The pose comes from the scene: `tip_from_camera = tip_from_sensor * sensor_from_camera`. Intrinsics are those that
     /// the cell publishes through [`super::TRUTH_FUNCTION`], or else those of the sensor's settings, which are exact for

@@ -1,8 +1,8 @@
-//! Following a goal that moves: the arm is led by a caller that tells, pass by pass, where the tip should be.
+//! Following a goal that moves: a caller gives, pass by pass, where the tip should be.
 //!
-//! Each point is computed here and sent for one pass of the simulation, as for a jog: the arm stands within a pass when
-//! this client hangs, dies, or loses its connection. A caller that takes longer than a pass makes the arm stand in the
-//! passes between; it still moves by one step of one pass then, because the way of several in one would be wild, and
+//! Each point is computed here and sent for one pass of the simulation, as for a jog: the arm stops within a pass when
+//! this client hangs, crashes, or loses its connection. A caller that takes longer than a pass makes the arm wait in
+//! the passes between; it then still moves by the step of one pass, because several steps in one would be too fast, and
 //! after a longer pause it starts again from rest.
 
 use handeye_arm::JointValues;
@@ -17,7 +17,7 @@ use crate::error::LinkError;
 use crate::options::CallOptions;
 use crate::sim::ObjectHandle;
 
-/// What the arm is asked for, in messages.
+/// Name of the task, in messages.
 const TASK: &str = "following";
 
 /// An arm that got no point for longer \[passes\] has visibly come to rest, and starts from there. A network that misses a
@@ -44,7 +44,7 @@ pub struct FollowMoment {
     pub joints: JointValues,
     /// The tip by these joints.
     pub base_from_tip: Pose<Base, Tip>,
-    /// Whether the arm does not go as its goal asks, because it would come too near to something.
+    /// Whether the arm does not move as its goal asks, because it would come too near to an obstacle.
     pub is_kept_off: bool,
 }
 
@@ -53,13 +53,13 @@ impl Arm {
     /// the limits in any case. The goal is shown by the target dummy, where there is one; in the end that is at the tip,
     /// where motions to a pose start it.
     ///
-    /// `wish` is asked once per pass, also while the arm comes to rest in the end, when its answer changes nothing any
-    /// more. The simulation is not held meanwhile; if a few passes go by, the goal is taken to move on as it says.
+    /// `wish` is called once per pass, also while the arm comes to rest in the end, when its answer has no effect. The
+    /// simulation is not held meanwhile; if a few passes go by, the goal is taken to move on at its velocity.
     ///
     /// # Errors
     /// [`LinkError::NotRunning`], also when the simulation is ended meanwhile; [`LinkError::BadMotion`] for limits that
     /// make no sense before anything moves, and for a goal that is not finite with the arm at rest. After any other
-    /// [`LinkError`] the arm stands where it was last sent.
+    /// [`LinkError`] the arm is at rest where it was last sent.
     pub fn follow(
         &mut self,
         kinematics: &ArmKinematics,

@@ -1,4 +1,4 @@
-//! Where an arm that follows is sent, within which limits, and how it ends.
+//! Goal and limits of an arm that follows, and how following ends.
 
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_plan::SpeedLimits;
@@ -19,7 +19,7 @@ pub struct FollowLimits {
     pub turn_acceleration_rad_s2: f64,
     /// Speed of any joint [rad/s]; one that shifts may have this over [`super::RAD_PER_M`] [m/s].
     pub joint_speed_rad_s: f64,
-    /// Acceleration of any joint [rad/s²]; of one that shifts likewise [m/s²].
+    /// Acceleration of any joint [rad/s²]; of a prismatic joint [m/s²].
     pub joint_acceleration_rad_s2: f64,
     /// Where the tip may be.
     pub workspace: Workspace,
@@ -43,13 +43,13 @@ impl Default for FollowLimits {
 }
 
 impl FollowLimits {
-    /// No faster than what stands around allows.
+    /// No faster than the surroundings allow.
     #[must_use]
     pub(crate) fn within(&self, limits: &SpeedLimits) -> Self {
         Self { speed_m_s: limits.tip(self.speed_m_s), joint_speed_rad_s: limits.joint(self.joint_speed_rad_s), ..*self }
     }
 
-    /// Whether all of it makes sense.
+    /// Whether all limits are valid.
     ///
     /// # Errors
     /// [`LinkError::BadMotion`] names what is not positive and finite, or a workspace without room.
@@ -92,7 +92,7 @@ pub struct Workspace {
 
 impl Default for Workspace {
     /// What a UR5 reaches from where the public scene has it, at the origin: 1 m to all sides, but not lower than 0.1 m
-    /// above the floor, because a camera and the flange are beside the tip.
+    /// above the floor, because camera and flange are next to the tip.
     fn default() -> Self {
         Self { min: Point3::new(-1.0, -1.0, 0.1), max: Point3::new(1.0, 1.0, 1.2) }
     }
@@ -139,7 +139,7 @@ pub(super) fn moved(base_from_tip: &Isometry3<f64>, shift: &Vector3<f64>, turn: 
     )
 }
 
-/// How following ended; the arm stands.
+/// How following ended; the arm is at rest.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FollowEnd {
     /// The caller wanted it.

@@ -5,7 +5,7 @@
 //! ranges of the joints and the workspace, and touches nothing; otherwise less of the step is taken, in the worst case
 //! none, and the arm brakes. So whatever goals come, the limits hold from the first pass to the last, and the arm can always be stopped.
 //!
-//! What the arm must not touch does not end it: it goes by, as near to its goal as it can, or stands and goes on when the goal does.
+//! An obstacle does not end following: the arm passes it, as near to its goal as possible, or waits and goes on when the goal does.
 
 use handeye_arm::JointValues;
 use handeye_geometry::frames::{Base, Pose, Tip};
@@ -27,18 +27,19 @@ const BRAKING_SHARE: f64 = 0.9;
 const APPROACH_SHARE: f64 = 0.7;
 
 /// Near the goal the tip makes up for this share of its distance per second [1/s]: slow enough that the noise of a goal
-/// from images, 0.1 mm from one to the next, asks for less than a fiftieth of the acceleration.
+/// from images, 0.1 mm from one to the next, needs less than a fiftieth of the acceleration.
 const APPROACH_RATE: f64 = 8.0;
 
 /// Largest share of the distance that is made up for in one pass: with more, a long pass would swing past the goal.
 const APPROACH_PER_PASS: f64 = 0.5;
 
-/// Where the joints are so fast that the tip gets on with less than this share of its limits, it is not getting anywhere.
+/// Where the joints are so fast that the tip moves at less than this share of its limits, it makes no progress.
 const CRAWL: f64 = 0.05;
 
-/// A step in which a joint would be too fast is slowed down at least so much, as long as it is more than the crawl.
+/// A step in which a joint would be too fast is slowed down at least by this factor, as long as it is faster than the
+/// crawl.
 const LEAST_SLOWING: f64 = 0.9;
-/// How often: from full speed to less than the crawl.
+/// Number of such reductions: from full speed to less than the crawl.
 const SLOWINGS: usize = 32;
 
 /// How finely the share of a step that can be taken is sought: to a 64th.
@@ -48,7 +49,7 @@ const HALVINGS: usize = 6;
 /// takes less than a second.
 const LONGEST_BRAKING: usize = 4000;
 
-/// What a limit may be exceeded by through rounding \[relative\].
+/// Tolerance of the limits for rounding \[relative\].
 const ROUNDING: f64 = 1e-6;
 
 /// The arm in motion: where it is, and its speeds in the last pass.
@@ -99,7 +100,7 @@ impl<'a> FollowPlan<'a> {
     /// From a standstill at `joints`, in passes of `dt_s`; `limits` have to be valid.
     ///
     /// # Errors
-    /// What forbids to move at all: a joint out of its range, or a tip outside of the workspace.
+    /// A joint out of its range, or a tip outside of the workspace: no motion is possible.
     pub fn new(
         kinematics: &'a ArmKinematics,
         limits: &FollowLimits,
@@ -127,22 +128,23 @@ impl<'a> FollowPlan<'a> {
         Pose::from_isometry(self.now.base_from_tip)
     }
 
-    /// What was in the way; the arm comes to rest, and goals are no longer looked at.
+    /// What was in the way; the arm comes to rest, and goals are ignored.
     pub fn obstacle(&self) -> Option<FollowEnd> {
         self.obstacle.clone()
     }
 
-    /// Whether in the last pass the arm did not go as its goal asked, because it would have come too near to something.
+    /// Whether in the last pass the arm did not move as its goal asked, because it would have come too near to an
+    /// obstacle.
     pub fn is_kept_off(&self) -> bool {
         self.is_kept_off
     }
 
-    /// Whether it stands.
+    /// Whether the arm is at rest.
     pub fn is_at_rest(&self) -> bool {
         self.now.is_at_rest()
     }
 
-    /// Tells that the arm stands after all, because it did not get its points for a while.
+    /// Reports that the arm is at rest after all, because it did not get its points for a while.
     pub fn stand(&mut self) {
         self.now = Moving::standing(self.kinematics, self.now.joints);
     }
@@ -176,7 +178,7 @@ impl<'a> FollowPlan<'a> {
             BRAKING_SHARE * limits.acceleration_m_s2 * self.dt_s / now.velocity_m_s.norm(),
             BRAKING_SHARE * limits.turn_acceleration_rad_s2 * self.dt_s / now.turn_rad_s.norm(),
         ];
-        // A speed of zero gives an infinite share, or none that is a number; neither is the smallest.
+        // A speed of zero gives an infinite share or NaN; neither is the smallest.
         let kept = 1.0 - lost.into_iter().fold(1.0, f64::min);
         now.after(self.kinematics, now.rates.map(|rate| rate * kept), self.dt_s)
     }
@@ -205,7 +207,7 @@ impl<'a> FollowPlan<'a> {
                     (largest_step / by_rad).min(LEAST_SLOWING)
                 }
                 Err(JogObstacle::JointRange { joint, .. }) => return Err(FollowEnd::JointLimit { joint }),
-                // What is touched is looked at afterwards.
+                // Contacts are checked afterwards.
                 Err(JogObstacle::Reach(_) | JogObstacle::Singular { .. } | JogObstacle::Contact(_)) => 0.5,
             };
             if share * share_of_limits < CRAWL {
@@ -220,7 +222,8 @@ impl<'a> FollowPlan<'a> {
         let (limits, now, dt_s) = (&self.limits, &self.now, self.dt_s);
         let velocity_m_s = goal.velocity_m_s.cap_magnitude(limits.speed_m_s);
         let turn_rad_s = goal.angular_velocity_rad_s.cap_magnitude(limits.turn_rad_s);
-        // The goal is for one pass later; what is between it and the tip now is what is left if both move on alike.
+        // The goal is for one pass later; its distance from the tip now is the distance left if both move on in the
+        // same way.
         let goal_now = moved(goal.base_from_tip.isometry(), &(velocity_m_s * -dt_s), &(turn_rad_s * -dt_s));
         let shift = goal_now.translation.vector - now.base_from_tip.translation.vector;
         let turn = rotation_vector(&(goal_now.rotation * now.base_from_tip.rotation.inverse()));
@@ -245,7 +248,7 @@ impl<'a> FollowPlan<'a> {
         keep_off::deflected(rates, &room, -fastest, &jacobian, speed_m_s / turn_rad_s)
     }
 
-    /// As much of a step as can be taken; what is left of it is braking.
+    /// As much of a step as can be taken; the rest of it is braking.
     fn most_of(&self, rates: &JointValues, braked: &Moving) -> Moving {
         let change_rad_s = self.limits.joint_acceleration_rad_s2 * self.dt_s;
         let mut share: f64 = 1.0;
@@ -313,8 +316,8 @@ impl<'a> FollowPlan<'a> {
     }
 }
 
-/// The speed at which what is left shrinks: in proportion to it when it is small, else so that a steady deceleration
-/// takes it there. Both meet with the same slope, so the deceleration is never exceeded.
+/// The speed at which the remaining distance shrinks: in proportion to it when it is small, else so that a steady
+/// deceleration takes it there. Both meet with the same slope, so the deceleration is never exceeded.
 fn approach(left: &Vector3<f64>, (fastest, acceleration): (f64, f64), rate: f64) -> Vector3<f64> {
     let distance = left.norm();
     if distance == 0.0 {

@@ -72,7 +72,7 @@ impl<'a> Run<'a> {
         Self { arm, plan, dt_s: DT_S, points: vec![START] }
     }
 
-    /// Brakes until it stands, in how many passes.
+    /// Brakes until it is at rest; the number of passes.
     fn rest(&mut self) -> usize {
         for pass in 0..1000 {
             if self.plan.is_at_rest() {
@@ -83,7 +83,8 @@ impl<'a> Run<'a> {
         panic!("it never stands")
     }
 
-    /// What was exceeded by how much, over all points and a standstill after them. Computed from the points alone.
+    /// The limit that was exceeded and by how much, over all points and a stop after them. Computed from the points
+    /// alone.
     fn broken_limit(&self, limits: &FollowLimits) -> Option<String> {
         let last = *self.points.last()?;
         let points: Vec<JointValues> =
@@ -366,7 +367,7 @@ fn numbers_without_sense_move_nothing_wildly() {
 #[derive(Debug, Clone)]
 struct Leg {
     passes: u32,
-    /// Without one it rests.
+    /// Without a goal it stays at rest.
     goal: Option<FollowGoal>,
 }
 
@@ -570,6 +571,6 @@ fn past_a_box_that_is_too_near_to_its_way_the_arm_goes_on_to_its_goal() {
         assert_eq!(run.plan.obstacle(), None, "at {at}");
     }
     println!("{got_by} of {in_the_way} boxes were gone past");
-    // Before one in the middle of the way it stands.
+    // It stops before one in the middle of the way.
     assert!(got_by > 0, "none of {in_the_way}");
 }

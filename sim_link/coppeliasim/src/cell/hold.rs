@@ -15,7 +15,7 @@ impl Held {
         match sim.acquire_lock() {
             Ok(()) => Ok(Self { epoch: sim.connection().epoch() }),
             Err(error) => {
-                // The request may still reach the server, which would then be held with nobody to let go.
+                // The request may still reach the server, which would then be held with no client to release it.
                 sim.connection().renew();
                 Err(error)
             }

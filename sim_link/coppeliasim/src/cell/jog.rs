@@ -1,7 +1,8 @@
-//! Jogging: the arm moves for as long as somebody holds a button, or by a small step.
+//! Jogging: the arm moves for as long as a button is held, or by a small step.
 //!
-//! The next point is computed here and sent for one pass of the simulation, so the arm stands within a pass when this
-//! client hangs, dies, or loses its connection. As long as it lives, it comes to rest within the limits of acceleration.
+//! The next point is computed here and sent for one pass of the simulation, so the arm stops within a pass when this
+//! client hangs, crashes, or loses its connection. As long as the client runs, the arm comes to rest within the limits
+//! of acceleration.
 
 use handeye_arm::JointValues;
 use handeye_geometry::frames::{Base, Camera, Pose, Tip};
@@ -13,7 +14,7 @@ use super::stream::{Pass, Point, Stream};
 use super::{Arm, require_running};
 use crate::error::LinkError;
 
-/// What the arm is asked for, in messages.
+/// Name of the task, in messages.
 const TASK: &str = "jogging the arm";
 
 /// A jog of one joint, along an axis or about one.
@@ -30,7 +31,7 @@ pub enum ArmJog<'a> {
     Line {
         /// The chain of the arm.
         kinematics: &'a ArmKinematics,
-        /// Whose axes.
+        /// Frame of the axis.
         axes: JogAxes,
         /// The direction in these axes.
         along: Vector3<f64>,
@@ -40,7 +41,7 @@ pub enum ArmJog<'a> {
     Turn {
         /// The chain of the arm.
         kinematics: &'a ArmKinematics,
-        /// Whose axes.
+        /// Frame of the axis.
         axes: JogAxes,
         /// The direction in these axes.
         about: Vector3<f64>,
@@ -50,15 +51,15 @@ pub enum ArmJog<'a> {
 /// Axes along which the tip is jogged, as they are when the jog begins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum JogAxes {
-    /// Those of the base.
+    /// The base's axes.
     Base,
-    /// Those of the tip.
+    /// The tip's axes.
     Tip,
-    /// Those of the camera, which is here.
+    /// The axes of the camera, which has this pose.
     Camera(Pose<Tip, Camera>),
 }
 
-/// How a jog ended; the arm stands.
+/// How a jog ended; the arm is at rest.
 #[derive(Debug, Clone, PartialEq)]
 pub enum JogEnd {
     /// It was let go.
@@ -81,11 +82,12 @@ pub enum JogEnd {
 impl Arm {
     /// Jogs from a standstill until it is let go, is `length` further (m or rad) or something is in the way.
     ///
-    /// `held` is asked once per pass: for the share of the fastest speed, over 0 and up to 1, or `None` to come to rest.
+    /// `held` is called once per pass: for the share of the fastest speed, over 0 and up to 1, or `None` to come to
+    /// rest.
     ///
     /// # Errors
     /// [`LinkError::NotRunning`], also when the simulation is ended meanwhile; [`LinkError::BadMotion`] for a joint or a
-    /// direction that does not exist. After any other [`LinkError`] the arm stands where it was last sent.
+    /// direction that does not exist. After any other [`LinkError`] the arm is at rest where it was last sent.
     pub fn jog(
         &mut self,
         jog: &ArmJog<'_>,

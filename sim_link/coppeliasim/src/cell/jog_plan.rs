@@ -32,10 +32,10 @@ const JOINT_RATE: f64 = 90.0 * std::f64::consts::PI / 180.0;
 /// it is not getting anywhere, and stops.
 const CRAWL: f64 = 0.02;
 
-/// Points of the way to a standstill that are looked at before each step.
+/// Points of the way to a stop that are checked before each step.
 const LOOK_AHEAD: usize = 8;
 
-/// Points of a step of known length that are looked at before it begins.
+/// Points of a step of known length that are checked before it begins.
 const STEP_SAMPLES: usize = 64;
 
 /// A joint that turns by more between two neighbouring points of a path has changed to another configuration \[rad\].
@@ -44,7 +44,7 @@ const JUMP_RAD: f64 = 0.5;
 /// Dimensions of a pose: joints beyond these are to spare.
 const POSE: usize = 6;
 
-/// What a limit of speed may be exceeded by through rounding \[relative\].
+/// Tolerance of a speed limit for rounding \[relative\].
 const ROUNDING: f64 = 1e-6;
 
 /// How often a step that is too fast is halved before it is given up: to less than the crawl.
@@ -182,11 +182,11 @@ fn near(
 /// The fastest speed for the next `dt_s` from which the rest of a distance is enough to stop.
 fn stopping_speed(distance: f64, acceleration: f64, dt_s: f64) -> f64 {
     let left = distance.max(0.0);
-    // Of v·dt + v²/2a = distance, written so that nothing cancels.
+    // The solution of v·dt + v²/2a = distance, written so that nothing cancels.
     2.0 * left / (dt_s + (dt_s * dt_s + 2.0 * left / acceleration).sqrt())
 }
 
-/// What a jog is kept clear of, and where its tip is.
+/// Obstacles that a jog avoids, and where its tip is.
 #[derive(Debug)]
 pub(super) struct Watch<'a> {
     /// What it may come near to.
@@ -199,7 +199,7 @@ impl Watch<'_> {
         self.guard.surroundings().limits
     }
 
-    /// The speed along a path at which the tip has its limit, from two points that are so far apart on it.
+    /// The speed along a path at which the tip has its limit, from two points that are `between` apart on it.
     fn tip_limit(&self, from: &JointValues, to: &JointValues, between: f64) -> f64 {
         let Some(tip_m_s) = self.limits().tip_m_s else { return f64::INFINITY };
         match (self.arm.tip(from), self.arm.tip(to)) {
@@ -215,7 +215,7 @@ pub(super) struct JogPlan<'a> {
     path: Path<'a>,
     among: Option<Watch<'a>>,
     dt_s: f64,
-    /// Where it ends by itself.
+    /// Length after which it ends by itself.
     length: Option<f64>,
     distance: f64,
     speed: f64,
@@ -227,7 +227,7 @@ impl<'a> JogPlan<'a> {
     /// From a standstill at `joints`, in passes of `dt_s`; with a `length` \[m, rad\] it ends there.
     ///
     /// # Errors
-    /// What is in the way of a given length.
+    /// What prevents a jog of the given length.
     pub fn new(
         path: Path<'a>,
         among: Option<Watch<'a>>,
@@ -271,8 +271,8 @@ impl<'a> JogPlan<'a> {
         self.joints
     }
 
-    /// Moves on for one pass, more slowly if a joint would be too fast: what lies between the points that were looked
-    /// at may be worse than they are.
+    /// Moves on for one pass, more slowly if a joint would be too fast: the speed between the checked points may be
+    /// higher than at them.
     fn step(&mut self) -> Result<(), JogObstacle> {
         let mut joint = 0;
         for _ in 0..SLOWER_STEPS {
@@ -325,17 +325,17 @@ impl<'a> JogPlan<'a> {
         }
     }
 
-    /// Whether it stands.
+    /// Whether the arm is at rest.
     pub fn is_at_rest(&self) -> bool {
         self.speed <= AT_END || self.is_at_end()
     }
 
-    /// Whether its length is behind it.
+    /// Whether its length is complete.
     pub fn is_at_end(&self) -> bool {
         self.length.is_some_and(|length| self.distance >= length)
     }
 
-    /// What is in the way, once it slows down for it.
+    /// The obstacle, once the jog slows down for it.
     pub fn obstacle(&self) -> Option<&JogObstacle> {
         self.obstacle.as_ref()
     }

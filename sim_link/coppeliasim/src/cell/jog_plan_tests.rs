@@ -22,7 +22,7 @@ fn joint(index: usize, sign: f64, [min, max]: [f64; 2]) -> Path<'static> {
     Path::Joint { index, joint: CellJoint { kind: JointKind::Revolute, range }, sign, start: START }
 }
 
-/// Advances while `share` is wanted, until it stands, and gives every point.
+/// Advances while `share` gives one, until it is at rest, and returns every point.
 fn run(plan: &mut JogPlan<'_>, mut share: impl FnMut(usize) -> Option<f64>) -> Vec<JointValues> {
     let mut points = Vec::new();
     for pass in 0..10_000 {

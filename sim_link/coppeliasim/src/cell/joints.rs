@@ -10,17 +10,17 @@ use crate::constants;
 use crate::error::LinkError;
 use crate::sim::{ObjectHandle, Sim};
 
-/// A metre of a prismatic joint counts as so many radians of a revolute one: where joints that turn may be as fast as those
-/// of the stock UR5 model, 90°/s, one that shifts may do 0.5 m/s. That is twice the fastest jog of the tip, which it need
-/// not hold up, and what linear axes under arms of this size do.
+/// Radians of a revolute joint that count as one metre of a prismatic one: where revolute joints may be as fast as those of
+/// the stock UR5 model, 90°/s, a prismatic one may do 0.5 m/s. That is twice the fastest jog of the tip, so it does not
+/// limit it, and usual for linear axes under arms of this size.
 pub const RAD_PER_M: f64 = std::f64::consts::PI;
 
 /// A joint that is driven.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CellJoint {
-    /// How it moves.
+    /// Revolute or prismatic.
     pub kind: JointKind,
-    /// How far, as the simulator has it; endless for one that turns without end. Its speed is not known.
+    /// Range in the simulator; endless for a cyclic joint. Its speed is not known.
     pub range: JointRange,
 }
 
@@ -50,7 +50,7 @@ pub(super) fn in_rad(kind: JointKind, value: f64) -> f64 {
     }
 }
 
-/// What is so many radians of a joint that turns, of any joint.
+/// Converts radians to the unit of any joint.
 pub(super) fn of_rad(kind: JointKind, rad: f64) -> f64 {
     match kind {
         JointKind::Revolute => rad,
@@ -58,8 +58,7 @@ pub(super) fn of_rad(kind: JointKind, rad: f64) -> f64 {
     }
 }
 
-/// How far apart two values of a joint are \[rad\]: of angles the short way round, for a joint that turns without end comes
-/// back from the other side.
+/// How far apart two values of a joint are \[rad\]: of angles the short way round, as a cyclic joint wraps around.
 pub(super) fn difference_rad(kind: JointKind, a: f64, b: f64) -> f64 {
     if kind == JointKind::Prismatic {
         return in_rad(kind, a - b).abs();
@@ -78,7 +77,7 @@ pub(super) fn largest_change(kinds: impl Iterator<Item = JointKind>, from: &[f64
         .fold((0, 0.0), |most, next| if next.1 > most.1 { next } else { most })
 }
 
-/// Where the joints stand.
+/// Reads where the joints are.
 pub(super) fn read_joint_values(sim: &mut Sim, objects: &CellObjects) -> Result<JointValues, LinkError> {
     let mut values = JointValues::zeros(objects.joints.len());
     for (value, &joint) in values.iter_mut().zip(&objects.joints) {

@@ -8,8 +8,9 @@
 //! q̇ + W⁻¹ g (-v - g · q̇) / (gᵀ W⁻¹ g)
 //! ```
 //!
-//! An arm with joints to spare so gives way with them alone. Reference: Faverjon and Tournassoud 1987, "A local based approach for
-//! path planning of manipulators with a high number of degrees of freedom" (the bound on how fast a distance shrinks).
+//! A redundant arm thus gives way with its redundant joints only. Reference: Faverjon and Tournassoud 1987, "A local based
+//! approach for path planning of manipulators with a high number of degrees of freedom" (the bound on how fast a distance
+//! shrinks).
 
 use handeye_arm::JointValues;
 use handeye_plan::Guard;
@@ -19,15 +20,15 @@ use nalgebra::{DMatrix, DVector, Matrix6xX};
 /// a millimetre or so.
 const STEP: f64 = 1e-4;
 
-/// What a joint that moves by a radian costs at least, as motion of the tip \[m\]: so little that joints to spare give way first,
-/// and so much that those that hardly move the tip, as near a singular position, do not race.
+/// What a joint that moves by a radian costs at least, as motion of the tip \[m\]: so little that redundant joints give way
+/// first, and so much that those that hardly move the tip, as near a singular position, do not race.
 const LEAST_COST_M: f64 = 0.03;
 
-/// What is next to an arm.
+/// Free space next to an arm.
 pub(super) struct Room {
-    /// How much nearer it may come \[m\].
+    /// How much nearer an obstacle may come \[m\].
     pub left_m: f64,
-    /// How that changes with the joints [m/rad; of a prismatic joint m/m].
+    /// How that changes with the joints [m/rad, or m/m for a prismatic joint].
     gradient: DVector<f64>,
 }
 
@@ -47,8 +48,8 @@ impl Room {
     }
 }
 
-/// Rates with which the room changes by no less than `least_m_s`, and the tip moves as nearly as it was to; `None` where these
-/// do. A turn of the tip by a radian counts as a shift by `turn_m`.
+/// Rates with which the room changes by no less than `least_m_s`, and the tip moves as closely as possible to its command;
+/// `None` where the given rates do. A turn of the tip by a radian counts as a shift by `turn_m`.
 pub(super) fn deflected(
     rates: &JointValues,
     room: &Room,

@@ -1,4 +1,4 @@
-//! Frames of cells that tell what their images show, and of others.
+//! Frames of cells that report the moment of their images, and of others.
 
 use super::*;
 

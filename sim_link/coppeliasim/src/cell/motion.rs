@@ -1,9 +1,8 @@
 //! Motions to a goal: of the joints, and of the tip along a straight line.
 //!
-//! Each point is computed here and sent for one pass of the simulation, as for a jog: the arm stands within a pass when
-//! this client hangs, dies, or loses its connection, a stop is braked on every simulator, and it takes nothing of a server
-//! but to put a joint somewhere. In every pass the joints are where they were sent, or the motion ends and says which is
-//! not.
+//! Each point is computed here and sent for one pass of the simulation, as for a jog: the arm stops within a pass when
+//! this client hangs, crashes, or loses its connection, a stop is braked on every simulator, and a server only has to set
+//! joint positions. In every pass the joints are where they were sent, or the motion ends and reports which is not.
 //!
 //! For the tip that takes an arm whose kinematics is known; any other is left to the server, see [`super::served`].
 
@@ -29,7 +28,7 @@ use handeye_motion::{self as motion, JointMotion, MotionState, Sync};
 pub(super) const LONGEST_MOTION: Duration = Duration::from_mins(10);
 
 /// How long a pass that is under way may go on after a motion was cancelled: a pass takes a twentieth of a second, but
-/// another client may hold the simulation for ever.
+/// another client may hold the simulation forever.
 pub(super) const BRAKE_GRACE: Duration = Duration::from_millis(300);
 
 /// Longest time to come to rest, in real time. From the fastest motion of the reference sequence it takes about two seconds.
@@ -43,22 +42,23 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 /// line leads past a singular position. One that shifts over [`super::RAD_PER_M`] of it \[m/s\], as of all that follows.
 const LINE_JOINT_SPEED_RAD_S: f64 = std::f64::consts::FRAC_PI_2;
 
-/// How a stop brakes, not as gently as the motion goes: joints as hard as those of the stock UR5 may [rad/s², rad/s³], the
+/// Braking of a stop, harder than the motion's own: joints as hard as those of the stock UR5 may [rad/s², rad/s³], the
 /// tip, which stays on its line, from 0.3 m/s within two passes and 15 mm [m/s² and rad/s², m/s³ and rad/s³].
 const JOINT_BRAKE: [f64; 2] = [2.0 * std::f64::consts::PI, 20.0 * std::f64::consts::PI];
 const LINE_BRAKE: [f64; 2] = [6.0, 240.0];
 
-/// Joints that move by less in a pass stand \[rad\], and passes after which an arm stands that does not come nearer.
+/// Joints that move by less in a pass are at rest \[rad\], and passes after which an arm that does not come nearer is
+/// at rest.
 const STANDS_RAD: f64 = 1e-5;
 const LONGEST_OVERTIME_PASSES: u32 = 100;
 
 /// Passes of a line that are gone through beforehand at most.
 const MOST_PASSES: usize = 100_000;
-/// Of a cube with edges of 1.
+/// Space diagonal of a unit cube.
 const SPACE_DIAGONAL: f64 = 1.732_050_807_568_877_2;
 
-/// How far from its goal a joint may stand when a motion is over that a controller moves \[rad\]: a load keeps it from its
-/// target by a little.
+/// Largest distance of a controlled joint from its goal at the end of a motion \[rad\]: a load keeps it from its target by
+/// a little.
 const ARRIVED_OFF_RAD: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
 /// A way to a goal, and where on it the arm is.
@@ -87,7 +87,7 @@ struct Line<'a> {
     joint_speed_rad_s: f64,
     goal: Pose<Base, Tip>,
     joints: JointValues,
-    /// Of the tip, along x, y, z and about its axis.
+    /// Speeds of the tip, along x, y, z and about its axis.
     speeds: Vec<f64>,
     /// Velocities of the joints while the tip is off its line.
     astray: Option<JointValues>,
@@ -210,7 +210,7 @@ fn joint_brake(kinds: &[JointKind], vel: &[f64]) -> motion::MotionLimits {
     brake(vel, |i| JOINT_BRAKE.map(|limit| of_rad(kinds[i], limit)))
 }
 
-/// Limits of coming to rest, of which `hardest` gives acceleration and jerk.
+/// Limits of braking; `hardest` gives acceleration and jerk.
 fn brake(vel: &[f64], hardest: impl Fn(usize) -> [f64; 2]) -> motion::MotionLimits {
     // Braking makes nothing faster, so the limit of speed is only not to be in the way.
     let fastest = vel.iter().fold(1.0_f64, |fastest, vel| fastest.max(vel.abs()));
@@ -268,7 +268,7 @@ fn unplanned(error: &motion::MotionError) -> LinkError {
 }
 
 impl Arm {
-    /// Moves the joints to `goal` (rad, or m of a prismatic joint) within `limits` and those of what stands around, and
+    /// Moves the joints to `goal` (rad, or m of a prismatic joint) within `limits` and those of the surroundings, and
     /// returns when they are there and, where a controller moves them, at rest.
     ///
     /// # Errors
@@ -304,7 +304,7 @@ impl Arm {
         }
     }
 
-    /// Moves the tip to `goal` within `limits` (x, y, z, angle), waits until the arm stands still, and compares.
+    /// Moves the tip to `goal` within `limits` (x, y, z, angle), waits until the arm is at rest, and compares.
     ///
     /// An arm whose kinematics is known goes along a straight line as far as it can; towards a goal out of reach it ends as
     /// near as it gets. Any other is moved by the inverse kinematics of the server.
@@ -342,7 +342,7 @@ impl Arm {
         Err(LinkError::Unreached { distance_mm: distance_m * 1e3, angle_deg: angle_rad.to_degrees() })
     }
 
-    /// The limits of a motion of the joints, no faster than what stands around allows, where nothing is in its way.
+    /// The limits of a motion of the joints, no faster than the surroundings allow, where nothing is in its way.
     fn limits_to(
         &self,
         start: &JointValues,
@@ -366,8 +366,8 @@ impl Arm {
         Ok(limits)
     }
 
-    /// A motion of the tip along a line within the limits of what stands around, where nothing is in its way. All of it is gone
-    /// through as it will be sent, also where it leads out of reach and leaves its line.
+    /// A motion of the tip along a line within the limits of the surroundings, where nothing is in its way. All of it is
+    /// checked as it will be sent, also where it leads out of reach and leaves its line.
     fn line_among<'k>(
         &self,
         kinematics: &'k ArmKinematics,
@@ -401,7 +401,7 @@ impl Arm {
         Ok(way)
     }
 
-    /// Where the joints stand, ready to be moved.
+    /// Where the joints are, ready to be moved.
     fn ready(&mut self, task: &'static str, cancel: &CancelToken) -> Result<JointValues, LinkError> {
         require_running(&mut self.sim, task)?;
         if cancel.is_cancelled() {

@@ -70,7 +70,7 @@ impl CellObjects {
 pub(super) struct Carriers {
     /// The joints between base and tip, from the base up; without a base those between the top of the scene and the tip.
     pub joints: Vec<ObjectHandle>,
-    /// Whether the base was met.
+    /// Whether the chain reaches the base.
     pub reach_base: bool,
 }
 
@@ -96,7 +96,7 @@ impl Carriers {
     }
 }
 
-/// All that bear the name of the joints, in the order of the scene.
+/// All objects with the name of the joints, in the order of the scene.
 fn named_joints(sim: &mut Sim, paths: &CellPaths) -> Result<Vec<ObjectHandle>, LinkError> {
     let mut joints = Vec::new();
     while joints.len() <= MAX_JOINTS {
@@ -123,7 +123,7 @@ fn required(sim: &mut Sim, paths: &CellPaths, part: CellPart) -> Result<ObjectHa
     present(found)?.ok_or_else(|| missing(sim, path, part))
 }
 
-/// Only when the server says that there is none it is so; another refusal is the server's to explain.
+/// The object is absent only when the server reports that; any other refusal is an error.
 fn present(found: Result<ObjectHandle, LinkError>) -> Result<Option<ObjectHandle>, LinkError> {
     match found {
         Ok(handle) => Ok((handle.0 >= 0).then_some(handle)),

@@ -26,7 +26,7 @@ pub struct CellPaths {
     pub camera: String,
     /// The vision sensor for depth, at the same place; empty for the one for colour.
     pub depth: String,
-    /// The shape that the board is printed on, which is not among what stands around; there need not be one.
+    /// The shape that the board is printed on, which is not an obstacle; there need not be one.
     pub board: String,
 }
 
@@ -67,7 +67,7 @@ pub enum CellPart {
     Board,
 }
 
-/// What is no assignment of a path.
+/// A text that is not an assignment of a path.
 #[derive(Debug, Clone, PartialEq, Eq, Error, handeye_wording::Localized)]
 pub enum BadCellPath {
     /// No part of that name.
@@ -102,7 +102,7 @@ impl CellPart {
         }
     }
 
-    /// What it is, in words.
+    /// Description of the part.
     pub(crate) fn what(self) -> Text {
         match self {
             Self::Arm => text!("base of the arm"),
@@ -132,7 +132,7 @@ impl CellPart {
 }
 
 impl CellPaths {
-    /// As the built-in cell has them for an arm of this name.
+    /// The paths of the built-in cell for an arm of this name.
     pub fn below(arm: &str) -> Self {
         Self {
             arm: format!("/{arm}"),
@@ -183,7 +183,7 @@ impl CellPaths {
     /// Sets one path by `part=path`.
     ///
     /// # Errors
-    /// [`BadCellPath`] says what a right one looks like; nothing is changed then.
+    /// [`BadCellPath`] describes a valid assignment; nothing is changed then.
     pub fn assign(&mut self, assignment: &str) -> Result<(), BadCellPath> {
         let (key, path) = assignment.split_once('=').ok_or_else(|| BadCellPath::NotSet(assignment.to_owned()))?;
         let part = CellPart::ALL.into_iter().find(|part| part.key() == key.trim());

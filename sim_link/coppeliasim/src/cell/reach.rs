@@ -1,4 +1,4 @@
-//! The chain of the arm of a scene, as the running simulation has it, and what it can reach.
+//! The chain of the arm of a scene, as in the running simulation, and what it can reach.
 
 use handeye_arm::{
     ArmError, ArmFrames, ArmKind, DlsOptions, IkError, Joint, JointKind, JointRange, JointValues, MAX_JOINTS,
@@ -15,22 +15,22 @@ use super::objects::{Carriers, CellObjects};
 use crate::error::LinkError;
 use crate::sim::{ObjectHandle, Sim};
 
-/// How far an axis of a joint may be from where the built-in kinematics has it \[m\]. The model and the manufacturer's
-/// table differ by 7 mm; a physics engine holds its joints together to a tenth of a millimetre.
+/// Largest distance of a joint's axis from the built-in kinematics \[m\]. The model and the manufacturer's table differ
+/// by 7 mm; a physics engine holds its joints together to a tenth of a millimetre.
 const AXIS_TOLERANCE_M: f64 = 1e-3;
 
-/// How far it may be turned \[rad\].
+/// Largest angle of the axis from it \[rad\].
 const AXIS_TOLERANCE_RAD: f64 = 0.2 * std::f64::consts::PI / 180.0;
 
-/// How far the reported tip may be from the computed one [m, rad]: a tip that was moved on the flange, or another
-/// tool. An arm with dynamic joints gives way by less.
+/// Largest distance of the reported tip from the computed one [m, rad]: exceeded by a tip that was moved on the flange,
+/// or another tool. An arm with dynamic joints gives way by less.
 const TIP_TOLERANCE_M: f64 = 2e-3;
 const TIP_TOLERANCE_RAD: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
 /// How often joints and axes are read again because the arm moved meanwhile.
 const ATTEMPTS: u32 = 5;
 
-/// The kinematics of the arm in a scene: its chain, where it stands, what it carries, and how far its joints move.
+/// The kinematics of the arm in a scene: its chain, where its base is, the tip on it, and the ranges of its joints.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ArmKinematics {
     /// From the arm frame to the connection, with the ranges of the scene.
@@ -45,7 +45,7 @@ pub struct ArmKinematics {
 #[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum UnknownKinematics {
-    /// Where the arm stands is not known.
+    /// The place of the arm is not known.
     #[error("the scene has no {path}, which tells where the arm stands")]
     NoArm {
         /// The path looked for.
@@ -59,7 +59,7 @@ pub enum UnknownKinematics {
         /// The path looked for.
         path: String,
     },
-    /// Other joints carry the tip than when the scene was looked at.
+    /// Other joints carry the tip than when the scene was read.
     #[error("other joints carry the tip than when the connection was made: connect again")]
     OtherJoints,
     /// What was read is not an arm.
@@ -71,16 +71,16 @@ pub enum UnknownKinematics {
     /// The server did not answer what has to be known.
     #[error("the arm could not be measured: {reason}")]
     Unreadable {
-        /// What it said.
+        /// The error that it reported.
         reason: Text,
     },
-    /// It did not stand still.
+    /// The arm was not at rest.
     #[error("the arm moved while its axes were read; let it stand and connect again")]
     Moving,
 }
 
 impl ArmKinematics {
-    /// That of a UR5 that stands at `base_from_arm` and carries its tip at `connection_from_tip`.
+    /// The kinematics of a UR5 at `base_from_arm` with its tip at `connection_from_tip`.
     ///
     /// # Errors
     /// [`ArmError::WrongCount`], and [`ArmError::BadJoint`] for ranges without room.
@@ -93,7 +93,7 @@ impl ArmKinematics {
         Ok(Self { arm, is_ur5: true, base_from_arm, connection_from_tip })
     }
 
-    /// That of an arm that is known otherwise, up to its tip.
+    /// The kinematics of any other known arm, up to its tip.
     pub fn new(arm: handeye_arm::Arm, base_from_arm: Isometry3<f64>) -> Self {
         Self { arm, is_ur5: false, base_from_arm, connection_from_tip: Isometry3::identity() }
     }
@@ -108,12 +108,12 @@ impl ArmKinematics {
         self.arm.joints().iter().map(|joint| joint.kind)
     }
 
-    /// Where the arm stands.
+    /// Pose of the arm in the base frame.
     pub fn base_from_arm(&self) -> &Isometry3<f64> {
         &self.base_from_arm
     }
 
-    /// How it carries its tip; the identity for an arm that was measured up to there.
+    /// Pose of the tip on the connection; the identity for an arm that was measured up to its tip.
     pub fn connection_from_tip(&self) -> &Isometry3<f64> {
         &self.connection_from_tip
     }
@@ -123,7 +123,7 @@ impl ArmKinematics {
         self.is_ur5
     }
 
-    /// Where the tip is with these joints; nowhere, which is not a number, for joints that are none.
+    /// Pose of the tip with these joints; NaN for invalid joint values.
     pub fn tip(&self, joints: &[f64]) -> Pose<Base, Tip> {
         let arm_from_connection = match self.arm.forward(joints) {
             Ok(pose) => *pose.isometry(),
@@ -140,7 +140,7 @@ impl ArmKinematics {
     /// The joint values nearest to `seed` that put the tip to `goal`, within the ranges of the joints.
     ///
     /// # Errors
-    /// [`IkError`] says what is in the way or which joint would leave its range.
+    /// [`IkError`] with the obstacle or the joint that would leave its range.
     pub fn reach(&self, goal: &Pose<Base, Tip>, seed: &[f64]) -> Result<JointValues, IkError> {
         self.solve(&self.arm, goal, seed)
     }
@@ -152,7 +152,7 @@ impl ArmKinematics {
         seed: &[f64],
         ranges: &[JointRange],
     ) -> Result<JointValues, IkError> {
-        // Ranges about joints that are not numbers are none.
+        // Ranges about joints that are not numbers are invalid.
         let arm = self.arm.clone().with_ranges(ranges).map_err(|_none| IkError::NotFinite)?;
         self.solve(&arm, goal, seed)
     }
@@ -167,7 +167,7 @@ impl ArmKinematics {
     }
 
     /// The joint values, found from `seed` on, that take the tip as near to `goal` as the arm can; the seed for a goal that
-    /// is no pose.
+    /// is not a valid pose.
     pub(super) fn towards(&self, goal: &Pose<Base, Tip>, seed: &JointValues) -> JointValues {
         let arm_from_tip = Pose::from_isometry(self.base_from_arm.inverse() * goal.isometry());
         let found = self.with_tip(self.connection_from_tip).towards(&arm_from_tip, seed, &DlsOptions::default());
@@ -199,10 +199,10 @@ impl Arm {
     /// where the tip is behind the last one. At known joint positions that determines how the tip moves with the joints, so
     /// one configuration is enough.
     ///
-    /// An arm whose axes are those of the UR5 as the simulator has it is taken for that one, whose numbers are exact.
+    /// An arm whose axes are those of the UR5 in the simulator counts as that one, whose numbers are exact.
     ///
     /// # Errors
-    /// A lost connection; that the arm cannot be measured, or is none that can be driven, is no error but the inner result.
+    /// A lost connection; an arm that cannot be measured or driven is not an error but the inner result.
     pub fn kinematics(&mut self) -> Result<Result<ArmKinematics, UnknownKinematics>, LinkError> {
         match self.measured_kinematics() {
             Err(error) if !error.is_connection_loss() => {
@@ -259,7 +259,7 @@ fn measure(sim: &mut Sim, objects: &CellObjects, arm: ObjectHandle) -> Result<Op
 }
 
 impl Measured {
-    /// Where everything would be if it were the UR5; `None` for joints that one does not have.
+    /// Where all frames would be if it were the UR5; `None` for joint values that a UR5 does not have.
     fn as_ur5(&self) -> Option<ArmFrames> {
         ArmKind::Ur5Coppeliasim.arm().frames(&self.joints).ok()
     }
@@ -272,7 +272,7 @@ impl Measured {
         self.arm_from_joint.iter().zip(&expected.base_from_joint).all(|(found, expected)| {
             let axis = expected.rotation * Vector3::z();
             let angle_rad = (found.rotation * Vector3::z()).angle(&axis);
-            // Where along its axis a joint has its origin is a matter of drawing.
+            // The place of a joint's origin along its axis is arbitrary.
             let between = found.translation.vector - expected.translation.vector;
             let distance_m = (between - axis * between.dot(&axis)).norm();
             distance_m <= AXIS_TOLERANCE_M && angle_rad <= AXIS_TOLERANCE_RAD

@@ -21,13 +21,13 @@ use handeye_plan::{self as planning, Guard, PlannedView, Surroundings, ViewOptio
 /// With this share of its limits in every direction the tip goes along with a board at 50 mm/s that turns by 10° a second,
 /// and still comes closer to it.
 const ENOUGH: f64 = 0.25;
-/// With less it is slowed down wherever the board goes, and a little further it stands.
+/// With less it is slowed down wherever the board goes, and a little further it stops.
 const LEAST: f64 = 0.12;
 
 /// Steps to each end of the reach: on the way there the arm must not get into a singular position either.
 const STEPS: u32 = 2;
 
-/// A place for several paths of a board, one after the other, has room for so much more than one for a single path.
+/// A place for several paths of a board, one after the other, has room for this many times the reach of a single path.
 const WIDER: f64 = 1.5;
 
 /// Other distances between camera and board that are tried, relative to that of now.
@@ -50,7 +50,7 @@ pub struct BoardReach {
 
 impl Default for BoardReach {
     /// Twice what the built-in cell moves its board by from the middle of its path (40 mm in its plane, 20 mm along its
-    /// normal, 3°): whoever begins amid the path has all of it on one side.
+    /// normal, 3°): a start at one end of the path has all of it on one side.
     fn default() -> Self {
         Self { in_plane_m: 0.08, out_of_plane_m: 0.04, turn_rad: 6.0_f64.to_radians() }
     }
@@ -100,7 +100,7 @@ pub struct FollowPlace {
      the column of the arm, and not to the end of its reach"
 )]
 pub struct NoPlace {
-    /// Places that were looked at.
+    /// Places that were checked.
     pub tried: usize,
 }
 
@@ -113,8 +113,8 @@ impl BoardInView {
 }
 
 impl ArmKinematics {
-    /// Where the arm follows a board from: `None` where it has room from these joints ([`Self::has_room_to_follow`]), else
-    /// [`Self::place_to_follow`].
+    /// Joints from which the arm follows a board: `None` where it has room from these joints
+    /// ([`Self::has_room_to_follow`]), else [`Self::place_to_follow`].
     ///
     /// # Errors
     /// [`NoPlace`].
@@ -134,7 +134,7 @@ impl ArmKinematics {
     }
 
     /// Whether the tip can follow the board at a usual speed from these joints, wherever it goes within `reach` while its
-    /// view is kept, touches nothing of what it is kept clear of, and sees the whole board also when that is there at once.
+    /// view is kept, touches none of the obstacles, and sees the whole board also when that is there at once.
     pub(crate) fn has_room_to_follow(
         &self,
         limits: &FollowLimits,
@@ -148,11 +148,11 @@ impl ArmKinematics {
             && self.room_over(limits, board, reach, joints, ENOUGH, guard.as_ref()) >= ENOUGH
     }
 
-    /// The nearest place from which the whole board is seen, also when it is elsewhere within `reach` at once, and the arm has
-    /// room to go along with it over half as much again as `reach`; where there is none, over `reach`; where there is none either,
-    /// one from which the board is seen where it is now, and where none has enough room the one with most. Following keeps clear of
-    /// what it is `among`; the way there, straight for the joints, touches neither arm, board nor what stands around, and comes no
-    /// nearer to one of them that the arm begins too near to.
+    /// The nearest place from which the whole board is seen, also when it is elsewhere within `reach` at once, and the arm has room
+    /// to go along with it over half as much again as `reach`; where there is none, over `reach`; where there is none either, one
+    /// from which the board is seen where it is now, and where none has enough room the one with most. Following keeps clear of
+    /// what it is `among`; the way there, straight for the joints, touches neither arm, board nor surroundings, and comes no nearer
+    /// to one of them that the arm begins too near to.
     ///
     /// # Errors
     /// [`NoPlace`].
@@ -170,7 +170,7 @@ impl ArmKinematics {
         let distance_m = board.distance_m(&self.tip(from));
         let travel = |view: &PlannedView| planning::travel(from, &view.joints);
         let mut tried = 0;
-        // Views that keep a board which jumps in the image are few, and looked at first.
+        // Views that keep a board which jumps in the image are few, and checked first.
         for leeway_m in [reach.in_plane_m, 0.0] {
             let options = ViewOptions {
                 distance_m: DISTANCES.map(|times| distance_m * times),
@@ -213,8 +213,8 @@ impl ArmKinematics {
     }
 
     /// The least share of its limits that the tip can have in every direction from these joints, wherever the board goes
-    /// within `reach` while its view is kept; 0 where some of it cannot be followed at all, or not without touching something. Given up with any smaller value
-    /// as soon as it is below `wanted`.
+    /// within `reach` while its view is kept; 0 where some of it cannot be followed at all, or not without touching something.
+    /// Given up with any smaller value as soon as it is below `wanted`.
     fn room_over(
         &self,
         limits: &FollowLimits,
@@ -268,8 +268,7 @@ impl ArmKinematics {
     }
 }
 
-/// The joint rates of a motion of the tip; of those that an arm with joints to spare can have, the least. `None` where some
-/// motion has none.
+/// The joint rates of a motion of the tip; the smallest ones for a redundant arm. `None` where some motion has none.
 fn least_rates(jacobian: &Matrix6xX<f64>) -> Option<MatrixXx6<f64>> {
     let rates = if jacobian.ncols() == 6 {
         let square: Matrix6<f64> = jacobian.fixed_columns::<6>(0).into_owned();
@@ -278,7 +277,7 @@ fn least_rates(jacobian: &Matrix6xX<f64>) -> Option<MatrixXx6<f64>> {
         let square: Matrix6<f64> = jacobian * jacobian.transpose();
         square.try_inverse().map(|inverse| jacobian.transpose() * inverse)
     };
-    // Fewer joints than a pose has dimensions leave a matrix that is singular but for rounding.
+    // Fewer joints than a pose has dimensions leave a matrix that is singular up to rounding.
     rates.filter(|_| jacobian.ncols() >= 6)
 }
 

@@ -216,7 +216,7 @@ fn a_place_shows_the_whole_board_and_the_way_there_touches_nothing() {
     for (x, y) in [(-0.08, 0.0), (0.0, 0.08), (0.08, 0.0), (0.0, -0.08)] {
         assert!(is_seen(Vector3::new(x, y, 0.0), 0.0), "{x} {y}");
     }
-    // By the planner's own knowledge of the scene, which has a floor and a plate as well.
+    // With the planner's own knowledge of the scene, which has a floor and a plate as well.
     let setup = planning::ViewSetup::from(&scene);
     assert!(setup.path_is_free(sequence.last().expect("ten poses"), &place.joints, 0.01));
 }

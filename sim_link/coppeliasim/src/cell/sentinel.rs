@@ -1,7 +1,7 @@
-//! Hearing of a stop that another client asks for.
+//! Detects a stop that another client requests.
 //!
-//! A jog is a row of points to the server, not a motion that a stop could brake. So a motion of nothing, a number that
-//! slowly grows, goes along with it: the cell's stop ends that one too, and its next step says so.
+//! To the server a jog is a series of points, not a motion that a stop could brake. So a dummy motion, of a number that
+//! slowly grows, runs along with it: the cell's stop ends that one too, and its next step reports it.
 
 use ciborium::Value;
 
@@ -38,7 +38,7 @@ impl Sentinel {
         Ok(Self(Some(state)))
     }
 
-    /// Whether somebody has stopped everything since; to be asked once per pass.
+    /// Whether a client has stopped everything since; to be called once per pass.
     pub fn is_stopped(&mut self, sim: &mut Sim) -> Result<bool, LinkError> {
         let Some(state) = &mut self.0 else { return Ok(false) };
         let reply =

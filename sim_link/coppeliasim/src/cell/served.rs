@@ -1,9 +1,9 @@
 //! Motions of the tip by the inverse kinematics of the server, for an arm whose kinematics is not known here.
 //!
 //! They are taken step by step (`_init`, then `_step` and `sim.step` for each pass, then `_cleanup`): between two steps
-//! the stop button is looked at, and a client that dies leaves an arm that stands still. A server whose account of the
-//! motion cannot be read gets the single call, which answers once, at the end. Cancelling that ends this client's record
-//! on the server and with it the motion.
+//! the stop button is checked, and a client that crashes leaves an arm at rest. A server whose motion state cannot be
+//! read gets the single call, which answers once, at the end. Cancelling that ends this client's record on the server
+//! and with it the motion.
 
 use std::time::Instant;
 
@@ -36,7 +36,7 @@ impl Arm {
             // inverse kinematics, with a wrong length.
             Err(error @ LinkError::Malformed { .. }) => {
                 tracing::info!(%error, "the motion is made in a single call");
-                // It says nothing until its end, so it is found out before whether another client holds the simulation.
+                // It sends nothing until its end, so it is checked before whether another client holds the simulation.
                 self.sim.step(&CallOptions::cancelled_by(cancel))?;
                 let outcome = self.sim.move_to_pose(&motion, &CallOptions::long(LONGEST_MOTION, cancel));
                 match outcome {
@@ -103,7 +103,8 @@ impl Arm {
                 | LinkError::OwnCellSilent { .. }
                 | LinkError::OwnCellEnded { .. },
             ) => outcome,
-            // The arm has to stand before the caller hears of it. If it cannot be told to, that is the worse news.
+            // The arm has to be at rest before the caller gets the result. If it cannot be stopped, that is the error
+            // to report.
             Err(_) => self.stop().and(self.sim.move_to_pose_cleanup(state)).and(outcome),
         }
     }

@@ -1,11 +1,11 @@
 //! Sending the arm one point per pass of the simulation.
 //!
 //! A point is sent as `sim.moveToConfig` does it inside the server: a joint that is moved by forces gets a new target
-//! position, any other is put there. So the arm stands within a pass when this client hangs, dies, or loses its
-//! connection.
+//! position, any other is set to the position. So the arm stops within a pass when this client hangs, crashes, or loses
+//! its connection.
 //!
-//! A client that is too slow for the simulation misses passes, and the arm stands in them. It still gets the next point
-//! of its plan, one step of one pass: to make up for the passes it would have to move faster than it may.
+//! A client that is too slow for the simulation misses passes, and the arm is at rest in them. It still gets the next
+//! point of its plan, the step of one pass: to catch up it would have to exceed its speed limits.
 
 use std::time::Instant;
 
@@ -25,15 +25,15 @@ use crate::sim::ObjectHandle;
 pub(super) const PLACED_OFF_RAD: f64 = 1e-6;
 
 /// A joint moved by forces lags behind: by a few degrees, as its controller is tuned. One that lags more is given time while it
-/// comes nearer to where it was sent: no simulator says how fast its controllers can be \[rad\].
+/// comes nearer to where it was sent: no simulator reports how fast its controllers can be \[rad\].
 const DRIVEN_OFF_RAD: f64 = 15.0 * std::f64::consts::PI / 180.0;
 
-/// Points under way to an arm that nobody else moves.
+/// The stream of points to an arm that no other client moves.
 pub(super) struct Stream {
     sentinel: Sentinel,
     dynamic: Vec<bool>,
     sent: JointValues,
-    /// Where the joints were in the pass before.
+    /// Where the joints were in the previous pass.
     seen: JointValues,
     seen_s: Option<f64>,
     /// When simulated time went on for the last time.
@@ -53,7 +53,7 @@ pub(super) struct Slot {
     pub is_stopped: bool,
 }
 
-/// What is sent in a pass.
+/// The point that is sent in a pass.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Point {
     /// Where the joints go.
@@ -62,7 +62,7 @@ pub(super) struct Point {
     pub target: Option<Pose<Base, Tip>>,
 }
 
-/// What became of a pass.
+/// Result of a pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Pass {
     /// None has gone by since the last point, or a slow joint is still on its way to it; nothing was sent.
@@ -71,15 +71,15 @@ pub(super) enum Pass {
     Sent,
     /// A joint is not where it was sent; nothing was sent.
     NotFollowing {
-        /// Which, counted from 0.
+        /// The joint, counted from 0.
         joint: usize,
-        /// Where it is.
+        /// Its position.
         at: f64,
     },
 }
 
 impl Stream {
-    /// For an arm that stands at `start`; `task` says what for, in messages.
+    /// For an arm at rest at `start`; `task` names the purpose, in messages.
     pub fn begin(arm: &mut Arm, start: JointValues, task: &'static str) -> Result<Self, LinkError> {
         let joints = &arm.objects.joints;
         let dynamic = joints.iter().map(|&joint| arm.sim.is_joint_dynamic(joint)).collect::<Result<_, _>>()?;
@@ -106,7 +106,7 @@ impl Stream {
         &self.sent
     }
 
-    /// Whether a client had the cell stop everything since it began.
+    /// Whether a client had the cell stop everything since the stream began.
     pub fn is_stopped(&self) -> bool {
         self.is_stopped
     }
@@ -114,7 +114,7 @@ impl Stream {
     /// Whether a point was sent at this simulated time already, so that the next pass has to be waited for.
     ///
     /// # Errors
-    /// [`LinkError::WaitedTooLong`] when simulated time has stood for as long as a call may take.
+    /// [`LinkError::WaitedTooLong`] when simulated time has not advanced for as long as a call may take.
     pub fn has_sent_at(&self, arm: &mut Arm, now_s: f64) -> Result<bool, LinkError> {
         if self.seen_s != Some(now_s) {
             return Ok(false);
@@ -132,7 +132,7 @@ impl Stream {
         self.pass_with(arm, &CallOptions::default(), next)
     }
 
-    /// [`Self::pass`] with limits of its own for the wait.
+    /// [`Self::pass`] with separate limits for the wait.
     pub fn pass_with(
         &mut self,
         arm: &mut Arm,

@@ -1,4 +1,4 @@
-//! What stands around the arm, out of the scene; and the arm among it, as its motions are checked.
+//! The obstacles around the arm, from the scene; and the arm among them, as its motions are checked.
 
 use std::collections::HashSet;
 
@@ -14,41 +14,41 @@ use crate::sim::{ObjectHandle, Sim};
 
 /// Boxes that are kept at most, the nearest to the foot of the arm.
 const MOST_BOXES: usize = 500;
-/// Shapes that are looked at at most: each takes a few calls.
+/// Most shapes that are read: each takes a few calls.
 const MOST_SHAPES: usize = 2000;
-/// Boxes that are farther from the foot of the arm \[m\] are out of reach of every arm that stands on a table.
+/// Boxes that are farther from the foot of the arm \[m\] are out of reach of every arm on a table.
 const FARTHEST_M: f64 = 3.0;
-/// A box that has this point above the foot of the arm \[m\] in it is hollow, or the arm could not stand there.
+/// A box that contains this point above the foot of the arm \[m\] must be hollow, as the arm is in it.
 const ABOVE_FOOT_M: f64 = 0.05;
 
 /// Free space that jogs, motions to a goal and following keep, metres: less than planned views, because a person looks on and
 /// means to come near.
 const HAND_CLEARANCE_M: f64 = 0.01;
 
-/// What stands in a scene.
+/// The obstacles of a scene.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SceneObstacles {
-    /// What does not hang on the board.
+    /// The obstacles that are not attached to the board.
     pub around: Surroundings,
-    /// What holds the board and goes where it goes: where it was when the scene was looked at.
+    /// What holds the board and moves with it: where it was when the scene was read.
     pub on_board: Vec<Obstacle>,
 }
 
 impl SceneObstacles {
-    /// All of it, for planning about a board that stands.
+    /// All of them, for planning with a board at rest.
     pub fn all(&self) -> Surroundings {
         self.around.clone().and(Surroundings::of(self.on_board.clone()))
     }
 }
 
-/// The arm among what stands around it.
+/// The arm among the obstacles around it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Among {
     /// The arm, with what is on its tip.
     pub arm: planning::Arm,
-    /// What stands around.
+    /// The obstacles.
     pub around: Surroundings,
-    /// Free space that its motions keep, metres; where it stands nearer, no less than there is.
+    /// Free space that its motions keep, metres; where the arm is nearer already, no less than there is.
     pub clearance_m: f64,
 }
 
@@ -63,7 +63,7 @@ impl Among {
         Guard::strict(&self.arm, &self.around, self.clearance_m)
     }
 
-    /// What is in the way of a motion from one configuration straight in joint space to another.
+    /// The contact of a motion from one configuration straight in joint space to another.
     pub(super) fn contact(&self, from: &[f64], to: &[f64]) -> Option<Contact> {
         let guard = self.guard(from);
         guard.contact(to).or_else(|| guard.contact_on_path(from, to))
@@ -71,8 +71,8 @@ impl Among {
 }
 
 impl ArmKinematics {
-    /// The arm among what stands around it, as a person drives it: with a centimetre of free space. Where the camera is on its
-    /// tip is not always known; it is then taken to be at the tip.
+    /// The arm among the obstacles around it, as a person drives it: with a centimetre of free space. Where the camera is on
+    /// its tip is not always known; it is then taken to be at the tip.
     pub fn among(&self, around: Surroundings, tip_from_camera: Option<&Pose<Tip, Camera>>) -> Among {
         let camera = tip_from_camera.map_or_else(Isometry3::identity, |pose| *pose.isometry());
         Among { arm: self.as_planned(camera), around, clearance_m: HAND_CLEARANCE_M }
@@ -80,17 +80,17 @@ impl ArmKinematics {
 }
 
 impl Arm {
-    /// From now on jogs, motions of the joints or along a line and following end before they touch what stands around;
-    /// `None` where that is not known.
+    /// From now on jogs, motions of the joints or along a line and following end before they touch an obstacle; `None`
+    /// where these are not known.
     pub fn keep_clear(&mut self, among: Option<Among>) {
         self.among = among.map(std::sync::Arc::new);
     }
 
-    /// What stands around in the scene: a box about each shape, where it is now; what hangs on the board apart. Not among them are
-    /// the arm with all that hangs on it, the board itself, and boxes that the foot of the arm stands in, as of a cage: what is in those is not known from their
-    /// outside, and they are named in the log. Kept are the 500 nearest within 3 m of the foot of the arm; of more than 2,000
-    /// shapes the rest is left out, which the log says too. A camera beside the robot counts as any other shape. One whose size the
-    /// server does not tell is left out, which the log says.
+    /// The obstacles of the scene: a box about each shape, where it is now; those attached to the board separately. Excluded are
+    /// the arm with all that is attached to it, the board itself, and boxes around the foot of the arm, for example of a cage:
+    /// their inside is not known, and they are named in the log. The 500 nearest within 3 m of the foot of the arm are kept; of
+    /// more than 2,000 shapes the rest is left out, which is logged. A camera next to the robot counts as any other shape. A shape
+    /// whose size the server does not report is left out, which is logged.
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
@@ -159,7 +159,7 @@ fn read(
     let stands_on = boxes.iter().any(|(_, _, obstacle)| obstacle.distance_to(&below_foot) <= ABOVE_FOOT_M);
     let mut obstacles_found = SceneObstacles::default();
     if is_hollow || !stands_on {
-        // Whatever the arm stands on is not among the boxes: that is then its plane.
+        // What the arm is mounted on is not among the boxes: its plane is used instead.
         obstacles_found.around = kinematics.plane();
     }
     for (_, is_on_board, obstacle) in boxes {

@@ -37,7 +37,7 @@ struct World {
     track: Vec<f64>,
     /// The mode of every joint: 0 is kinematic, 5 dynamic.
     joint_mode: i64,
-    /// This joint refuses positions, until it was sent to a target that is not where it stands.
+    /// This joint refuses positions until it was sent to a target other than its position.
     stuck: Option<i64>,
     /// The account of a motion that the server gives.
     motion_state: Option<Vec<u8>>,
@@ -316,7 +316,7 @@ fn a_simulator_that_is_too_old_is_refused_before_anything_else_is_asked() {
     let (client, control, _) = try_cell(&world);
     assert_eq!(client.err(), Some(LinkError::TooOld { version: Some(40_699) }));
     assert_eq!(control.functions(), ["sim.getInt32Param"]);
-    // One that does not tell is no CoppeliaSim.
+    // A server that does not report it is not CoppeliaSim.
     for version in [40_700, 41_000, 0] {
         edit(&world, |w| w.version = version);
         assert_eq!(try_cell(&world).0.err(), None, "{version}");
@@ -436,7 +436,7 @@ fn a_stop_leaves_joints_alone_that_stand_where_they_were_put() {
     let mut cell = cell(world());
     cell.client.arm().stop().expect("calls");
     assert!(!cell.control.functions().contains(&"sim.setJointTargetPosition".to_owned()));
-    // What a target position moves is told to stay.
+    // A joint that a target position moves gets its present position as the target.
     edit(&cell.world, |w| (w.joint_mode, w.targets, w.joints) = (5, [1.0; JOINTS], [0.5; JOINTS]));
     cell.client.arm().stop().expect("calls");
     assert_eq!(cell.world().targets, [0.5; JOINTS]);
@@ -473,7 +473,7 @@ fn a_joint_that_is_held_in_a_motion_is_named_with_where_it_stands() {
 #[test]
 fn a_motion_whose_account_breaks_off_is_made_in_one_call() {
     let world = world();
-    // What the vendor's encoder makes of a map with 17 numbers as keys, of which it writes a few.
+    // The vendor's encoding of a map with 17 numbers as keys, of which it writes a few.
     edit(&world, |w| w.motion_state = Some(b"\xa1\x63ret\x81\xa1\x62ik\x91\x0f\x01".to_vec()));
     let mut cell = cell(world);
     let here = cell.client.arm().base_from_tip().expect("a pose");

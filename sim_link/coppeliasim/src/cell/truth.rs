@@ -1,4 +1,4 @@
-//! What a simulated cell says about itself, for comparison with what a calibration found.
+//! The ground truth of a simulated cell, for comparison with the result of a calibration.
 
 use ciborium::Value;
 use handeye_arm::JointValues;
@@ -22,7 +22,7 @@ const MOMENT_FUNCTION: &str = "handeye.moment";
 /// The truth about a simulated cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroundTruth {
-    /// The camera on the tip as the scene has it.
+    /// Pose of the camera on the tip in the scene.
     pub tip_from_camera: Pose<Tip, Camera>,
     /// The target in the base; `None` when the cell does not publish where its target's origin is.
     pub base_from_target: Option<Pose<Base, Target>>,
@@ -92,7 +92,7 @@ pub struct ShownMoment {
     pub base_from_target: Option<Pose<Base, Target>>,
 }
 
-/// What the images show, from a cell that has [`MOMENT_FUNCTION`]; `None` when they show nothing yet, or not now.
+/// What the images show, from a cell that has [`MOMENT_FUNCTION`]; `None` when they show nothing at present.
 ///
 /// # Errors
 /// [`LinkError::BadTruth`] when a part cannot be computed with; otherwise as for any call.

@@ -10,16 +10,16 @@ use super::reach::ArmKinematics;
 use handeye_plan::guided::choose::Robot;
 use handeye_plan::{self as planning, Obstacle, Pace, PlanError, Surroundings, ViewOptions, ViewSetup};
 
-/// How far below its frame the arm is mounted \[m\]. What it stands on is taken for a table.
+/// How far below its frame the arm is mounted \[m\]. Its mounting surface is assumed to be a table.
 const TABLE_BELOW_ARM_M: f64 = 0.0147;
 /// Edges of that table [m]: more than the arm reaches.
 const TABLE_M: [f64; 3] = [4.0, 4.0, 0.1];
-/// Views are planned from so much nearer and farther than those that there are.
+/// Views are planned at these multiples of the existing distances, too.
 const OTHER_DISTANCES: [f64; 2] = [0.9, 1.1];
 /// With fewer views nothing can be reported about their scatter.
 const LEAST_VIEWS: usize = 2;
 
-/// A board that a camera on the tip looks at, as far as it is known.
+/// A board in the view of a camera on the tip, as far as it is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoardInView {
     /// Where it is.
@@ -45,10 +45,10 @@ impl ArmKinematics {
     /// other: up to `count` of them, at least two, in an order with short ways. Nothing that is known is touched on the
     /// way from `start` to the first and from each to the next.
     ///
-    /// What is known is the arm itself, the board, and what stands around. `seed` is that of the views that are compared.
+    /// The arm itself, the board and the obstacles are known. `seed` is that of the candidate views.
     ///
     /// # Errors
-    /// [`PlanError`] says what was in the way.
+    /// [`PlanError`] with the obstacle.
     pub fn views_unlike(
         &self,
         board: &BoardInView,
@@ -77,7 +77,7 @@ impl ArmKinematics {
         Ok(views.iter().map(|view| view.joints).collect())
     }
 
-    /// What the planner knows of this arm.
+    /// What the planner knows about this arm.
     pub(super) fn view_setup(&self, board: &BoardInView, start: &JointValues, around: &Surroundings) -> ViewSetup {
         let sheet = planning::sheet(&board.target, &board.base_from_target, 0.0);
         ViewSetup {
@@ -91,8 +91,8 @@ impl ArmKinematics {
         }
     }
 
-    /// The arm as guided capture drives it from `joints`, at this pace, among what stands around. Where the camera sits is
-    /// not known before there is an estimate.
+    /// The arm as guided capture drives it from `joints`, at this pace, among the obstacles. The pose of the camera is not
+    /// known before there is an estimate.
     pub fn guided_robot(&self, joints: &JointValues, pace: Pace, around: &Surroundings) -> Robot {
         Robot {
             arm: self.as_planned(Isometry3::identity()),
@@ -114,7 +114,7 @@ impl ArmKinematics {
         }
     }
 
-    /// The plane that the arm stands on, for who knows nothing else of what stands around.
+    /// The plane that the arm is mounted on, where no other obstacles are known.
     pub fn plane(&self) -> Surroundings {
         let below = Isometry3::translation(0.0, 0.0, -TABLE_BELOW_ARM_M - TABLE_M[2] / 2.0);
         Surroundings::of(vec![Obstacle::new("plane under the arm", self.base_from_arm() * below, TABLE_M)])

@@ -51,7 +51,7 @@ fn views_are_taken_from_distances_like_those_of_the_fit() {
     let views = arm.views_unlike(&board, &taken, &start, &arm.plane(), 5, 1).expect("views");
     let planned: Vec<_> = views.iter().map(|joints| arm.tip(joints)).collect();
     for distance_m in distances(&planned) {
-        // The line of sight meets the board up to 4 cm beside its middle.
+        // The line of sight meets the board up to 4 cm from its middle.
         assert!((0.9 * least - 0.05..1.1 * most + 0.05).contains(&distance_m), "{distance_m} m");
     }
 }

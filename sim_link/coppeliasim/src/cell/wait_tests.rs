@@ -46,7 +46,7 @@ fn an_arm_is_not_waited_for_by_a_clock_that_stands_or_runs_backwards_or_is_none(
 
 #[test]
 fn a_clock_that_hardly_goes_on_is_not_waited_for() {
-    // Every pass is the distance to the next number, so the joints seem to race for ever.
+    // Every pass is the distance to the next number, so the joints always seem to race.
     let mut cell = with_clock(f64::next_up);
     edit(&cell.world, |w| w.targets = [1e9; JOINTS]);
     edit(&cell.world, |w| w.follow = 1e-12);

@@ -10,7 +10,7 @@ use crate::constants::INT_PROGRAM_VERSION;
 use crate::error::LinkError;
 use crate::options::CallOptions;
 
-/// How long the end of a simulation is waited for: it takes some three passes, and those of a large scene are slow.
+/// Longest wait for the end of a simulation: it takes about three passes, and those of a large scene are slow.
 const END: Duration = Duration::from_secs(10);
 
 impl Sim {
@@ -39,8 +39,8 @@ impl Sim {
         self.call("sim.stopSimulation", Vec::new()).map(drop)
     }
 
-    /// [`Sim::stop_simulation`], and waits for the end: until then a start is ignored, and whoever comes next and starts
-    /// it would be left with a simulation that ends.
+    /// [`Sim::stop_simulation`], and waits for the end: until then a start is ignored, and the next client to start it
+    /// would get a simulation that ends.
     ///
     /// # Errors
     /// Any [`LinkError`] of a call; [`LinkError::Timeout`] when the end does not come within ten seconds.
@@ -51,7 +51,7 @@ impl Sim {
             if began.elapsed() > END {
                 return Err(LinkError::Timeout { call: "sim.stopSimulation".to_owned(), after: began.elapsed() });
             }
-            // A pass later, or at once where none comes any more.
+            // A pass later, or at once where no more passes run.
             self.step(&CallOptions::default())?;
         }
         Ok(())
@@ -74,11 +74,11 @@ impl Sim {
     /// Simulated time (s).
     ///
     /// # Errors
-    /// Any [`LinkError`] of a call; [`LinkError::UnexpectedReply`] when it is no finite number.
+    /// Any [`LinkError`] of a call; [`LinkError::UnexpectedReply`] when it is not finite.
     pub fn get_simulation_time(&mut self) -> Result<f64, LinkError> {
         let call = "sim.getSimulationTime";
         let time_s = self.call(call, Vec::new())?.number(0)?;
-        // Whoever waits for a time to pass would wait for ever.
+        // Waiting for such a time would never end.
         time_s.is_finite().then_some(time_s).ok_or_else(|| LinkError::UnexpectedReply {
             call: call.to_owned(),
             expected: "a finite time".to_owned(),

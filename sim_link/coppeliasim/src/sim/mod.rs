@@ -39,7 +39,7 @@ impl ObjectHandle {
     }
 }
 
-/// What joints do, as far as it matters here.
+/// The range of a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointInterval {
     /// It turns without end.

@@ -67,7 +67,7 @@ pub struct PoseMotion {
     pub tip: ObjectHandle,
     /// The dummy that the tip follows; it is moved.
     pub target: ObjectHandle,
-    /// Where the tip goes, in the world.
+    /// Goal of the tip, in the world.
     pub target_pose: Pose<Base, Tip>,
     /// Limits for x, y, z and angle.
     pub limits: MotionLimits,
@@ -93,16 +93,16 @@ pub enum MotionStatus {
     Running,
     /// At its goal.
     Done,
-    /// At rest before its goal, because somebody stopped it.
+    /// At rest before its goal, because it was stopped.
     Stopped,
 }
 
 impl Sim {
-    /// Moves a tip to a pose of the world. The simulator does not say when its inverse kinematics fails: compare the
+    /// Moves a tip to a pose of the world. The simulator does not report when its inverse kinematics fails: compare the
     /// tip with the goal afterwards.
     ///
     /// # Errors
-    /// [`LinkError::BadMotion`] for limits that are none; otherwise as for any call.
+    /// [`LinkError::BadMotion`] for invalid limits; otherwise as for any call.
     pub(crate) fn move_to_pose(&mut self, motion: &PoseMotion, options: &CallOptions) -> Result<(), LinkError> {
         self.motion_call(MOVE, motion, options).map(drop)
     }
@@ -110,7 +110,7 @@ impl Sim {
     /// Prepares [`Sim::move_to_pose`] to be done step by step.
     ///
     /// # Errors
-    /// [`LinkError::BadMotion`] for limits that are none; otherwise as for any call.
+    /// [`LinkError::BadMotion`] for invalid limits; otherwise as for any call.
     pub(crate) fn move_to_pose_init(&mut self, motion: &PoseMotion) -> Result<MotionState, LinkError> {
         self.motion_call(INIT, motion, &CallOptions::default())?.into_map(0).map(MotionState)
     }

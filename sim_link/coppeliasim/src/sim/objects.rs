@@ -13,7 +13,7 @@ impl Sim {
     /// The object at a path such as `/UR5/Tip`.
     ///
     /// # Errors
-    /// [`LinkError::Remote`] when there is none.
+    /// [`LinkError::Remote`] when there is no such object.
     pub fn get_object(&mut self, path: &str) -> Result<ObjectHandle, LinkError> {
         Ok(ObjectHandle(self.call("sim.getObject", vec![Value::from(path)])?.integer(0)?))
     }
@@ -99,7 +99,7 @@ impl Sim {
     /// The pose of `object` in `frame`; the caller states which frames these are.
     ///
     /// # Errors
-    /// Any [`LinkError`] of a call; [`LinkError::BadValue`] when it is no rigid transform.
+    /// Any [`LinkError`] of a call; [`LinkError::BadValue`] when it is not a rigid transform.
     pub fn get_object_pose<Dst, Src>(
         &mut self,
         object: ObjectHandle,
@@ -130,8 +130,8 @@ impl Sim {
         self.call("sim.getJointPosition", vec![joint.to_value()])?.number(0)
     }
 
-    /// Whether a joint is moved by forces, so that only its controller can be told where to go; a joint that is not is
-    /// put from place to place.
+    /// Whether a joint is moved by forces, so that only its controller can be given a target; the position of any other
+    /// joint is set directly.
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
@@ -147,7 +147,7 @@ impl Sim {
     /// Any [`LinkError`] of a call.
     pub fn set_joint_position(&mut self, joint: ObjectHandle, position: f64) -> Result<bool, LinkError> {
         let reply = self.call("sim.setJointPosition", vec![joint.to_value(), Value::Float(position)])?;
-        // Servers that never refuse may also say nothing.
+        // Servers that never refuse may also return nothing.
         Ok(reply.integer(0) != Ok(0))
     }
 

@@ -70,7 +70,7 @@ impl Sim {
     /// Size, opening angle and clipping planes of a vision sensor.
     ///
     /// # Errors
-    /// Any [`LinkError`] of a call; [`LinkError::UnexpectedReply`] when the object is no perspective vision sensor.
+    /// Any [`LinkError`] of a call; [`LinkError::UnexpectedReply`] when the object is not a perspective vision sensor.
     pub(crate) fn get_sensor_optics(&mut self, sensor: ObjectHandle) -> Result<SensorOptics, LinkError> {
         let (width, height) = self.get_vision_sensor_resolution(sensor)?;
         let perspective = self.call("sim.getObjectInt32Param", parameter(sensor, VISION_PERSPECTIVE));

@@ -24,10 +24,10 @@ impl Sim {
         self.get_objects_in_tree(base, constants::OBJECT_SHAPE)
     }
 
-    /// The box about a shape; `None` of one whose size the server does not tell.
+    /// The box about a shape; `None` for one whose size the server does not report.
     ///
     /// # Errors
-    /// A lost connection, and any other [`LinkError`] that is no refusal.
+    /// A lost connection, and any other [`LinkError`] that is not a refusal.
     pub(crate) fn get_shape_box(&mut self, shape: ObjectHandle) -> Result<Option<ShapeBox>, LinkError> {
         match self.call("sim.getShapeBB", vec![shape.to_value()]) {
             Ok(reply) => {

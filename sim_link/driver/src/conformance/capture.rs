@@ -1,4 +1,4 @@
-//! A capture as the window takes one, but for the board: images with the robot at their instant, until both stand still.
+//! A capture like that of the window, without the board: images with the robot at their instant, until both are at rest.
 
 use std::time::{Duration, Instant};
 
@@ -9,7 +9,7 @@ use handeye_images::gray_from_rgb;
 use super::super::limits;
 use super::{Checked, Found, Run, wrong};
 
-/// How long robot and image may take to come to rest \[s\]: as long as in the window.
+/// Longest time for robot and image to come to rest \[s\]: the same as in the window.
 const SETTLE_S: f64 = 10.0;
 /// Longest run of the check: that of the slowest camera, with the images that show that something does not come to rest.
 const LONGEST: Duration = Duration::from_mins(1);

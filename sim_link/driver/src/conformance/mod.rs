@@ -1,4 +1,4 @@
-//! Whether a driver keeps to the protocol, and where it does not.
+//! Whether a driver follows the protocol, and where it does not.
 //!
 //! The run talks to the driver through the same connection that the workbench uses, so what passes here works there. A
 //! message that breaks the protocol ends a connection, and so the run: the first one is reported with its line.
@@ -24,7 +24,7 @@ use super::wire::Excerpt;
 pub use report::{Check, Outcome, Report};
 use report::{Checked, Found, Wrong, wrong};
 
-/// How many lines of the driver's log are shown.
+/// Number of lines of the driver's log that are shown.
 const LOG_LINES: usize = 10;
 
 /// What a conformance run may do.
@@ -68,7 +68,8 @@ fn has_images(hello: &Hello) -> bool {
 /// Runs all checks that the driver's abilities call for.
 ///
 /// # Errors
-/// [`DriverError::Start`] or [`DriverError::Connect`] where there is no driver to talk to; all else is in the report.
+/// [`DriverError::Start`] or [`DriverError::Connect`] where there is no driver to talk to; all other errors are in the
+/// report.
 pub fn run(spec: &DriverSpec, options: &ConformanceOptions, cancel: &CancelToken) -> Result<Report, DriverError> {
     let mut report = Report::new(spec.to_string());
     let driver = match Driver::start(spec, &options.driver, cancel) {
@@ -139,7 +140,7 @@ impl Run {
         Ok(Found::Warning(format!("{text}; {} is missing, which the window would show", missing.join(" and "))))
     }
 
-    /// Waits, and says if the driver is gone meanwhile.
+    /// Waits, and fails if the driver is gone meanwhile.
     fn wait(&self, patience: Duration) -> Result<(), Wrong> {
         self.driver.shared().wait(patience, Some(&self.cancel), |_| None::<()>)?;
         Ok(())

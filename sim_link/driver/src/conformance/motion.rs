@@ -14,18 +14,18 @@ use super::super::shared::{Inner, Progress};
 use super::super::states::Reading;
 use super::{Checked, Found, Run, Wrong, wrong};
 
-/// How far a joint is moved \[rad, m of a prismatic one\].
+/// How far a joint is moved \[rad, or m for a prismatic joint\].
 const TURN_RAD: f64 = 0.2;
 const SHIFT_M: f64 = 0.02;
-/// At which share of the highest speed: slow enough that a motion can be ended on its way.
+/// Share of the highest speed: slow enough that a motion can be ended on its way.
 const SPEED: f64 = 0.05;
-/// That of a motion which is to last for longer than the silence that ends it.
+/// Speed of a motion that has to last longer than the silence that ends it.
 const SLOW: f64 = 0.02;
-/// How long a motion is left alone before it is ended.
+/// How long a motion runs before it is ended.
 const UNDER_WAY: Duration = Duration::from_millis(150);
-/// A driver that hears nothing for so long brakes; a motion that was over before tells nothing.
+/// A driver that receives nothing for this long brakes; a motion that was over before shows nothing.
 const SILENCE: Duration = Duration::from_secs(1);
-/// With what braking takes.
+/// The same with the time for braking.
 const QUIET: Duration = Duration::from_millis(2500);
 /// How far an arm at rest may creep in a tenth of a second.
 const AT_REST: f64 = 1e-3;
@@ -76,7 +76,7 @@ impl Run {
         Ok(self.driver.first_state(self.options.driver.answer, &self.cancel)?.reading)
     }
 
-    /// Where the arm is, in the terms in which it is moved.
+    /// The present place as a goal, joints or tip, whichever the driver can move to.
     pub(super) fn goal_here(&self, reading: &Reading) -> Goal {
         match &reading.joints {
             Some(joints) if self.can(Ability::MoveJoints) => Goal::Joints(*joints),
@@ -103,12 +103,12 @@ impl Run {
 
     fn reaches(&self, goal: &Goal) -> Result<(), Wrong> {
         match self.driver.move_to(goal, SPEED, &self.cancel)? {
-            // What the states say of it is looked at below.
+            // The states are checked below.
             MoveEnd::Arrived | MoveEnd::NotThere(_) | MoveEnd::Unseen => {}
             MoveEnd::Stopped(why) => return wrong(format!("a motion was stopped that nobody ended: {why}")),
             MoveEnd::Refused(why) => return wrong(format!("a motion of 0.2 rad or 2 cm was refused: {why}")),
         }
-        // The state that says so may be a moment behind.
+        // The state that shows it may be late.
         self.wait(Duration::from_millis(200))?;
         let here = self.here()?;
         let [off_rad, off_m] = self.off(&here, goal);
@@ -205,7 +205,7 @@ impl Run {
     }
 }
 
-/// How far the arm is from a goal, in the coordinate that is farthest.
+/// Distance of the arm from a goal, in the coordinate with the largest one.
 fn far(reading: &Reading, goal: &Goal) -> f64 {
     match (goal, &reading.joints) {
         (Goal::Joints(goal), Some(here)) => goal.iter().zip(here).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max),

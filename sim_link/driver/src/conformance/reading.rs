@@ -8,7 +8,7 @@ use super::super::shared::Inner;
 use super::super::states::Reading;
 use super::{Checked, Found, Run, Wrong, wrong};
 
-/// How long clock and states are watched.
+/// How long clock and states are observed.
 const WATCHED: Duration = Duration::from_millis(1500);
 /// A driver's seconds may differ from ours by this part: pongs of a second and a half come with some milliseconds.
 const RATE_TOLERANCE: f64 = 0.05;
@@ -16,7 +16,7 @@ const RATE_TOLERANCE: f64 = 0.05;
 const RELATED_S: f64 = 0.01;
 /// A stamp that is this much in the future \[s\] is of another clock.
 const FUTURE_S: f64 = 0.05;
-/// States a second that the protocol asks for, with what one and a half seconds can tell.
+/// Rate of states that the protocol requires, with the resolution of one and a half seconds.
 const FEWEST_HZ: f64 = 8.0;
 const MOST_HZ: f64 = 600.0;
 /// Calibrated arms are a little past their limits at the stops \[rad, m\].
@@ -70,7 +70,7 @@ impl Run {
         Ok(if rate_hz > MOST_HZ { Found::Warning(format!("{text}: 500 are enough")) } else { Found::Passed(text) })
     }
 
-    /// Whether joints and poses belong together, as far as one place of the arm tells.
+    /// Whether joints and poses belong together, as far as one place of the arm shows.
     pub(super) fn chain(&self) -> Checked {
         match self.driver.chain_placement() {
             ChainPlacement::Unnamed => Ok(Found::Skipped(
@@ -91,7 +91,7 @@ impl Run {
         }
     }
 
-    /// Joint values within what `hello` says; degrees are the usual reason for others.
+    /// Joint values within the ranges of `hello`; degrees are the usual reason for others.
     fn in_range(&self, reading: &Reading) -> Result<(), Wrong> {
         let Some(values) = &reading.joints else { return Ok(()) };
         for (joint, value) in self.driver.hello().joints.iter().zip(values) {
@@ -104,7 +104,7 @@ impl Run {
         Ok(())
     }
 
-    /// How old a stamp is, which is near the present on the clock of the pongs.
+    /// Age of a timestamp, which must be near the present on the clock of the pongs.
     pub(super) fn of_this_clock(&self, stamp_s: f64) -> Result<f64, Wrong> {
         let Some(offset) = self.driver.clock() else { return wrong("no pong has related the clocks") };
         let age_s = self.driver.timebase().now_s() - offset.offset_s - stamp_s;

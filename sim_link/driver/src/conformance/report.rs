@@ -8,17 +8,18 @@ use super::super::error::{DriverError, Ending};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// As the protocol asks for.
+    /// As the protocol requires.
     Passed,
     /// Works, and could be better.
     Warning,
-    /// Not as the protocol asks for.
+    /// Not as the protocol requires.
     Failed,
-    /// Not tried, because the driver does not say that it can, because it was not allowed, or after an earlier failure.
+    /// Not tried, because the driver does not report the ability, because it was not allowed, or after an earlier
+    /// failure.
     Skipped,
 }
 
-/// What a check found that did not fail.
+/// Findings of a check that did not fail.
 #[derive(Debug)]
 pub(super) enum Found {
     Passed(String),
@@ -95,7 +96,7 @@ pub struct Report {
     pub passed: bool,
     /// The checks in the order in which they were made.
     pub checks: Vec<Check>,
-    /// What the driver said for people, the last lines.
+    /// The last lines of the driver's log.
     pub log: Vec<String>,
 }
 

@@ -18,9 +18,9 @@ use super::{Fake, FakeError};
 use handeye_coppeliasim::cell::{Arm, Frame, MotionTolerance};
 use handeye_coppeliasim::{LinkError, MotionLimits};
 
-/// How often states are looked for: several times a pass.
+/// Interval at which states are read: several times a pass.
 const LOOK: Duration = Duration::from_millis(5);
-/// A workbench that is silent for so long is gone.
+/// A workbench that is silent for this long is gone.
 const SILENCE: Duration = Duration::from_secs(1);
 /// The highest speed of a joint \[rad/s\], its acceleration and its jerk; those of the tip \[m/s, rad/s\].
 const JOINT: [f64; 3] = [1.5, 3.0, 15.0];
@@ -44,7 +44,7 @@ struct Motion {
     cancel: CancelToken,
 }
 
-/// An image that is asked for.
+/// A requested image.
 #[derive(Debug, Clone, Copy)]
 struct Wanted {
     id: u64,
@@ -52,7 +52,7 @@ struct Wanted {
     depth: bool,
 }
 
-/// What was asked for.
+/// A request under way.
 #[derive(Debug)]
 struct Asked {
     heard: Instant,
@@ -160,7 +160,7 @@ impl<'a, W: Write + Send> Conversation<'a, W> {
                 return Ok(());
             }
             self.lock().heard = Instant::now();
-            // What a later version sends is ignored.
+            // Messages of a later version are ignored.
             let Ok(message) = serde_json::from_slice::<ToDriver>(&line) else { continue };
             if message == (ToDriver::Bye {}) {
                 return Ok(());
@@ -250,7 +250,7 @@ impl<'a, W: Write + Send> Conversation<'a, W> {
         joints.len() == values.len() && joints.iter().zip(values).all(is_within)
     }
 
-    /// Waits for something that was asked for; `None` at the end of the conversation.
+    /// Waits for a request; `None` at the end of the conversation.
     fn next<T>(&self, mut find: impl FnMut(&mut Asked) -> Option<T>) -> Option<T> {
         let mut asked = self.lock();
         loop {
@@ -325,7 +325,7 @@ impl<'a, W: Write + Send> Conversation<'a, W> {
             loop {
                 let newest_s = camera.sim().get_simulation_time()?;
                 let is_new = wanted.after.is_none_or(|after| self.stamps().stamp(newest_s) > after);
-                // One that cannot be had whole is late; whoever waits for it has a limit.
+                // A frame that is not complete is late; the one that waits for it has a time limit.
                 let grabbed = match is_new.then(|| camera.grab()) {
                     None | Some(Err(LinkError::MixedInstants { .. })) => None,
                     Some(grabbed) => Some(grabbed?),

@@ -1,7 +1,7 @@
-//! A driver with the built-in cell behind it: for tests, and to see what a driver says.
+//! A driver with the built-in cell behind it: for tests, and as an example of a driver's messages.
 //!
 //! It is a client of a cell as the workbench is one, of its own cell or of one that runs already. So a robot and a camera
-//! can be two drivers of one cell, each with a clock of its own.
+//! can be two drivers of one cell, each with its own clock.
 
 mod conversation;
 mod stamps;
@@ -25,7 +25,7 @@ use stamps::Stamps;
 /// Simulated time from state to state \[s\]: fifty a second.
 const TIME_STEP_S: f64 = 0.02;
 
-/// Which part of the cell a fake driver is.
+/// The part of the cell that a fake driver provides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum FakePart {
     /// Robot and camera.
@@ -48,9 +48,9 @@ pub struct FakeOptions {
     pub connect: Option<Endpoint>,
     /// Robot, camera or both.
     pub part: FakePart,
-    /// Where its clock begins \[s\].
+    /// Start of its clock \[s\].
     pub clock_s: f64,
-    /// What it says that it cannot do.
+    /// Abilities that it reports not to have.
     pub cannot: Vec<Ability>,
 }
 
@@ -77,10 +77,10 @@ pub enum FakeError {
     /// The cell that was started has no address that can be used.
     #[error(transparent)]
     Endpoint(#[from] BadEndpoint),
-    /// The cell is none of this project, and does not say what its images show.
+    /// The cell is not one of this project, and does not report the moment of its images.
     #[error("{endpoint} is no cell of `handeye cell`: the fake driver takes no other")]
     OtherCell {
-        /// Where it is.
+        /// Its address.
         endpoint: Endpoint,
     },
     /// The workbench cannot be written to.
@@ -95,7 +95,7 @@ pub struct Fake {
     paths: CellPaths,
     link: ConnectionOptions,
     hello: Hello,
-    /// Where the tip is on the flange that it reports beside the tip; of a chain that it names.
+    /// Pose of the tip on the flange, which is reported in addition to the tip; for a chain that it names.
     flange_from_tip: Option<Isometry3<f64>>,
     stamps: Mutex<Stamps>,
     _server: Option<CellServer>,

@@ -3,10 +3,10 @@
 use std::collections::VecDeque;
 use std::time::Instant;
 
-/// How long an observation counts \[s\]: simulated time falls behind for good when the machine is busy.
+/// How long an observation counts \[s\]: simulated time falls behind permanently when the machine is busy.
 const MEMORY_S: f64 = 1.0;
 
-/// The clock of a fake driver, and how simulated time runs beside it.
+/// The clock of a fake driver, and how simulated time runs relative to it.
 #[derive(Debug)]
 pub struct Stamps {
     began: Instant,

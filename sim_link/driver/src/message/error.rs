@@ -5,7 +5,7 @@ use std::fmt;
 use super::PROTOCOL;
 use super::hello::Ability;
 
-/// What is wrong with a message of a driver. Whoever read it adds which line it was.
+/// What is wrong with a message of a driver. The reader adds the number of the line.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum BadMessage {
@@ -15,10 +15,10 @@ pub enum BadMessage {
     /// Text for people.
     #[error("not a message: standard output is for JSON messages alone, print to standard error")]
     Chatter,
-    /// It begins like a message and is none.
+    /// Begins like a message but is not valid JSON.
     #[error("not JSON: {why}")]
     NotJson {
-        /// What the parser says.
+        /// The error of the parser.
         why: String,
     },
     /// A field is missing or of another kind.
@@ -26,7 +26,7 @@ pub enum BadMessage {
     Field {
         /// Type of the message.
         kind: String,
-        /// What the parser says.
+        /// The error of the parser.
         why: String,
     },
     /// A field has a value that it cannot have.
@@ -37,7 +37,7 @@ pub enum BadMessage {
         /// What is wrong with it.
         why: String,
     },
-    /// A transform is none.
+    /// A transform is invalid.
     #[error("{field}: {why}")]
     Pose {
         /// The field of the message.
@@ -45,24 +45,24 @@ pub enum BadMessage {
         /// What is wrong with it.
         why: String,
     },
-    /// The number of bytes does not go with size and encoding.
+    /// The number of bytes does not match size and encoding.
     #[error("bytes: {got}, where width, height and encoding make {need}")]
     Length {
-        /// Said.
+        /// As stated in the message.
         got: u64,
-        /// From size and encoding.
+        /// As computed from size and encoding.
         need: u64,
     },
     /// Another version of the protocol.
     #[error("protocol: {got}, this workbench speaks {PROTOCOL}")]
     Protocol {
-        /// What the driver speaks.
+        /// The driver's version.
         got: u32,
     },
-    /// An ability without what belongs to it.
+    /// An ability without what it requires.
     #[error("can: {ability} needs {needs}")]
     Needs {
-        /// What the driver says that it can.
+        /// The ability that the driver reports.
         ability: Ability,
         /// What is missing.
         needs: &'static str,

@@ -48,12 +48,12 @@ impl fmt::Display for Ability {
 
 handeye_wording::plain_values!(Ability);
 
-/// A joint as the driver's `hello` has it.
+/// A joint in the driver's `hello`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct JointMessage {
     /// The name that the driver gives.
     pub name: String,
-    /// How it moves; revolute where absent.
+    /// Kind of the joint; revolute where absent.
     #[serde(default = "revolute")]
     pub kind: JointKind,
     /// Smallest value, rad or m; none where absent.
@@ -68,7 +68,7 @@ fn revolute() -> JointKind {
     JointKind::Revolute
 }
 
-/// Which chain the joints are, in the driver's `hello`.
+/// The chain of the joints, in the driver's `hello`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum ArmMessage {
@@ -135,25 +135,25 @@ pub struct CameraMessage {
 /// The driver's first message.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Hello {
-    /// Version of the protocol that it speaks.
+    /// Version of the driver's protocol.
     pub protocol: u32,
     /// The name that the driver gives.
     pub name: String,
     /// Version of the driver, in its own numbering.
     #[serde(default)]
     pub version: String,
-    /// What its stamps count: `monotonic`, `unix`, or any other word for people. They are seconds in each case.
+    /// Clock of its timestamps: `monotonic`, `unix`, or any other description. They are in seconds in each case.
     #[serde(default)]
     pub clock: String,
-    /// What it can do.
+    /// Its abilities.
     pub can: Vec<Ability>,
     /// The joints from the base up; with `joints` in `can`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joints: Vec<JointMessage>,
-    /// Which chain the joints are, where known.
+    /// The chain of the joints, where known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub arm: Option<ArmMessage>,
-    /// Where that chain stands in the base that poses are in; there where absent.
+    /// Pose of that chain in the base frame of the poses; the identity where absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base_from_arm: Option<PoseMessage>,
     /// The camera; with `image` in `can`.
@@ -165,7 +165,7 @@ pub struct Hello {
 }
 
 impl Hello {
-    /// Whether the driver says that it can.
+    /// Whether the driver reports this ability.
     pub fn can(&self, ability: Ability) -> bool {
         self.can.contains(&ability)
     }

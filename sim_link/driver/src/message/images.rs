@@ -8,7 +8,7 @@ use super::hello::LensMessage;
 /// Widest and highest image in pixels.
 pub const MAX_IMAGE_SIDE: u32 = 16_384;
 
-/// How the bytes of an image are to be read.
+/// Pixel format of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ImageEncoding {
@@ -24,7 +24,7 @@ pub enum ImageEncoding {
     Png,
 }
 
-/// How the bytes of a depth image are to be read; row by row from the top left.
+/// Pixel format of a depth image; row by row from the top left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DepthEncoding {
@@ -37,20 +37,20 @@ pub enum DepthEncoding {
 /// An image, without its bytes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ImageMessage {
-    /// Of the request that it answers.
+    /// Id of the request that it answers.
     pub id: u64,
     /// Middle of the exposure on the driver's clock, seconds.
     pub stamp: f64,
-    /// Half the interval that the instant lies in, seconds.
+    /// Half the interval that contains the instant, seconds.
     #[serde(default)]
     pub stamp_uncertainty_s: f64,
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// How the bytes are to be read.
+    /// Pixel format.
     pub encoding: ImageEncoding,
-    /// How many bytes follow.
+    /// Number of bytes that follow.
     pub bytes: u64,
     /// The lens at this instant, where it changes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -60,7 +60,7 @@ pub struct ImageMessage {
 /// A depth image, without its bytes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DepthMessage {
-    /// Of the request that it answers.
+    /// Id of the request that it answers.
     pub id: u64,
     /// On the driver's clock, seconds.
     pub stamp: f64,
@@ -68,9 +68,9 @@ pub struct DepthMessage {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// How the bytes are to be read.
+    /// Pixel format.
     pub encoding: DepthEncoding,
-    /// How many bytes follow.
+    /// Number of bytes that follow.
     pub bytes: u64,
 }
 

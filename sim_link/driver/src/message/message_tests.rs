@@ -19,7 +19,7 @@ fn messages(side: &str) -> Vec<String> {
         }
     }
     let complete = messages.into_iter().filter(|message| !message.contains('…'));
-    // Bytes and remarks stand behind the last brace.
+    // Bytes and remarks follow the last brace.
     complete.map(|message| message[..=message.rfind('}').unwrap()].to_owned()).collect()
 }
 

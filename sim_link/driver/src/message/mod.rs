@@ -1,7 +1,7 @@
 //! The messages of the driver protocol, in both directions: `docs/drivers.md` describes them, this is their form in Rust.
 //!
-//! What a driver sends is checked here once, so that nothing behind this module sees a number that is none, a quaternion
-//! that is no rotation, or an encoding without a meaning.
+//! What a driver sends is checked here once, so that no other module gets a number that is not finite, a quaternion that
+//! is not a rotation, or an unknown encoding.
 
 mod error;
 mod hello;
@@ -16,12 +16,12 @@ pub use hello::{Ability, ArmMessage, CameraMessage, Hello, JointMessage, LensMes
 pub use images::{DepthEncoding, DepthMessage, ImageEncoding, ImageMessage, MAX_IMAGE_SIDE};
 pub use robot::{PoseMessage, StateMessage};
 
-/// The version of the protocol that is spoken here.
+/// The version of the protocol of this program.
 pub const PROTOCOL: u32 = 1;
 /// Longest text of the parser that is shown, in characters.
 const LONGEST_MESSAGE: usize = 300;
 
-/// What the workbench sends.
+/// A message of the workbench.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum ToDriver {
@@ -44,7 +44,7 @@ pub enum ToDriver {
         /// Stamp of the newest image that the workbench has; `None` for any.
         #[serde(default)]
         after: Option<f64>,
-        /// Whether the depth image of the same instant is wanted too.
+        /// Whether the depth image of the same instant is requested too.
         #[serde(default)]
         depth: bool,
     },
@@ -59,10 +59,10 @@ pub enum ToDriver {
     Move {
         /// Number of this request.
         id: u64,
-        /// Where to, as joint values; one of the two is given.
+        /// Goal as joint values; one of the two is given.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         joints_rad: Option<JointValues>,
-        /// Where to, as a pose of the tip.
+        /// Goal as a pose of the tip.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         base_from_tip: Option<PoseMessage>,
         /// Share of the highest speed, over 0 and up to 1.
@@ -89,7 +89,7 @@ impl ToDriver {
 /// Answers a ping.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PongMessage {
-    /// Of the ping.
+    /// Id of the ping.
     pub id: u64,
     /// The driver's clock while it answers, seconds.
     pub stamp: f64,
@@ -98,21 +98,21 @@ pub struct PongMessage {
 /// Answers a request by its number.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AnswerMessage {
-    /// Of the request.
+    /// Id of the request.
     pub id: u64,
     /// Why, for people; with `refused` and `stopped`.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub why: String,
 }
 
-/// The driver has taken back by itself that it may move the arm.
+/// The driver has disarmed itself.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DisarmedMessage {
     /// Why, for people.
     pub why: String,
 }
 
-/// How much a log line matters.
+/// Severity of a log line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LogLevel {
@@ -130,10 +130,10 @@ pub enum LogLevel {
 /// A line for the log.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LogMessage {
-    /// How much it matters.
+    /// Severity.
     #[serde(default = "info")]
     pub level: LogLevel,
-    /// What to show.
+    /// The text to show.
     pub text: String,
 }
 
@@ -148,14 +148,14 @@ pub struct PreparingMessage {
     pub text: String,
 }
 
-/// What a driver sends. Bytes that follow a line are with whoever read them.
+/// What a driver sends. Bytes that follow a line are returned by the reader.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FromDriver {
     /// Answers `hello`.
     Hello(Box<Hello>),
     /// Answers `ping`.
     Pong(PongMessage),
-    /// Where the robot is; sent by itself.
+    /// State of the robot; sent without a request.
     State(Box<StateMessage>),
     /// Answers `next_image`.
     Image(ImageMessage),
@@ -163,11 +163,11 @@ pub enum FromDriver {
     Depth(DepthMessage),
     /// A motion begins.
     Accepted(AnswerMessage),
-    /// What was asked for is done; after `move` and `stop` the arm is at rest.
+    /// A request is done; after `move` and `stop` the arm is at rest.
     Done(AnswerMessage),
     /// A motion ended before its goal; the arm is at rest.
     Stopped(AnswerMessage),
-    /// What was asked for is not begun.
+    /// A request is refused and was not begun.
     Refused(AnswerMessage),
     /// The driver no longer moves the arm, by itself.
     Disarmed(DisarmedMessage),
@@ -181,7 +181,7 @@ pub enum FromDriver {
     Unknown(String),
 }
 
-/// What every message has.
+/// The fields of every message.
 #[derive(Debug, Deserialize)]
 struct Header {
     #[serde(rename = "type")]
@@ -194,9 +194,9 @@ impl FromDriver {
     /// Reads one line, with or without its end. Gives the message and the number of bytes that follow it.
     ///
     /// # Errors
-    /// [`BadMessage`] says what is wrong with it.
+    /// [`BadMessage`] with what is wrong.
     pub fn parse(line: &str) -> Result<(Self, u64), BadMessage> {
-        // An array can be read as a struct too, and is none here.
+        // An array can be read as a struct too, but is not valid here.
         if !line.trim_start().starts_with('{') {
             return Err(if line.trim().is_empty() { BadMessage::Empty } else { BadMessage::Chatter });
         }
@@ -240,7 +240,7 @@ fn body<'a, T: Deserialize<'a>>(kind: &str, line: &'a str) -> Result<T, BadMessa
     serde_json::from_str(line).map_err(|error| BadMessage::Field { kind: kind.to_owned(), why: error_text(&error) })
 }
 
-/// What the parser says, which may repeat what a driver has sent: on one line, and in its beginning.
+/// The error of the parser, which may repeat the driver's text: on one line and truncated.
 fn error_text(error: &serde_json::Error) -> String {
     let one_line = |c: char| if c.is_control() { ' ' } else { c };
     error.to_string().chars().map(one_line).take(LONGEST_MESSAGE).collect()
@@ -250,7 +250,7 @@ fn not_a_message(line: &str, error: &serde_json::Error) -> BadMessage {
     if error.is_data() {
         BadMessage::Field { kind: "message".to_owned(), why: error_text(error) }
     } else if line.contains("NaN") || line.contains("Infinity") {
-        // What Python writes for numbers that are none.
+        // Python's notation for numbers that are not finite.
         BadMessage::NotJson {
             why: format!("{}: JSON has no NaN and no Infinity, leave the field out", error_text(error)),
         }

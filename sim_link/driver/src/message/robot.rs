@@ -1,4 +1,4 @@
-//! Where the robot is, as a driver says it.
+//! The state of the robot as a driver reports it.
 
 use handeye_arm::JointValues;
 use handeye_geometry::frames::{Frame, Pose};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::BadMessage;
 
-/// How far the norm of a quaternion may be from 1: what single precision and six printed digits leave, with room.
+/// Largest deviation of a quaternion's norm from 1: single precision and six printed digits, with a margin.
 const UNIT_TOLERANCE: f64 = 1e-3;
 /// Translations longer than this are not metres \[m\].
 const LONGEST_TRANSLATION_M: f64 = 100.0;
@@ -29,7 +29,7 @@ impl PoseMessage {
     /// The pose between the frames that the field names.
     ///
     /// # Errors
-    /// [`BadMessage::Pose`] for a quaternion that is no rotation, or a translation of more than 100 m.
+    /// [`BadMessage::Pose`] for a quaternion that is not a rotation, or a translation of more than 100 m.
     pub(crate) fn pose<Dst: Frame, Src: Frame>(&self, field: &'static str) -> Result<Pose<Dst, Src>, BadMessage> {
         let norm = self.rotation_xyzw.iter().map(|v| v * v).sum::<f64>().sqrt();
         if (norm - 1.0).abs() > UNIT_TOLERANCE || !norm.is_finite() {
@@ -49,7 +49,7 @@ impl PoseMessage {
     }
 }
 
-/// The robot at one instant, as the driver says it.
+/// The robot at one instant, as the driver reports it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StateMessage {
     /// On the driver's clock, seconds.
@@ -57,16 +57,16 @@ pub struct StateMessage {
     /// A value for each joint, rad or m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joints_rad: Option<JointValues>,
-    /// Where the flange is.
+    /// Pose of the flange.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base_from_flange: Option<PoseMessage>,
     /// The tool that is set on the controller.
     #[serde(default, alias = "flange_from_tip", skip_serializing_if = "Option::is_none")]
     pub flange_from_tcp: Option<PoseMessage>,
-    /// Where the TCP is.
+    /// Pose of the TCP.
     #[serde(default, alias = "base_from_tcp", skip_serializing_if = "Option::is_none")]
     pub base_from_tip: Option<PoseMessage>,
-    /// Whether the controller moves the arm at this instant, where it says so.
+    /// Whether the controller moves the arm at this instant, where it reports that.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moving: Option<bool>,
 }

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::Topic;
 
-/// Which shapes messages have.
+/// Format of the messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RosVersion {
     /// `secs`, `nsecs`, `D`, `K`, and types without `/msg/`.
@@ -20,7 +20,7 @@ pub enum RosVersion {
 /// The robot: `world`, `base_link`, `link_1` and `tool0` hang on one another, `tool0` and `camera` do not move there.
 #[derive(Debug, Clone, Copy)]
 pub struct RosScene {
-    /// Of the messages.
+    /// Version of the messages.
     pub version: RosVersion,
     /// Width of the images.
     pub width: u32,
@@ -35,7 +35,7 @@ type Placed = ([f64; 3], [f64; 4]);
 const LINK_1: Placed = ([0.1, -0.2, 0.3], [0.0, 0.0, 0.247_403_959_254_522_94, 0.968_912_421_710_644_8]);
 /// `link_1` to `tool0`: turned by 90° about x.
 const TOOL0: Placed = ([0.4, 0.05, 0.12], [std::f64::consts::FRAC_1_SQRT_2, 0.0, 0.0, std::f64::consts::FRAC_1_SQRT_2]);
-/// Where `base_link` stands in the `world`.
+/// Pose of `base_link` in the `world`.
 const BASE_LINK: Placed = ([1.0, 2.0, 0.0], [0.0, 0.0, 1.0, 0.0]);
 
 impl RosScene {
@@ -77,7 +77,7 @@ impl RosScene {
         json!({"stamp": stamp, "frame_id": frame})
     }
 
-    /// Where `tool0` is in `base_link`.
+    /// Pose of `tool0` in `base_link`.
     pub fn base_from_tip(self) -> Isometry3<f64> {
         let isometry = |(t, q): Placed| {
             let rotation = UnitQuaternion::from_quaternion(Quaternion::from(q));
@@ -132,7 +132,7 @@ impl RosScene {
     }
 
     fn depth(self, time_s: f64) -> Value {
-        // Of the same exposure: image and depth have the same stamp, which is a multiple of their period.
+        // From the same exposure: image and depth have the same stamp, which is a multiple of their period.
         self.raw(time_s, "16UC1", 2 * self.width as usize, &self.depths())
     }
 

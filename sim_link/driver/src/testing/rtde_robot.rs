@@ -1,4 +1,5 @@
-//! A controller of Universal Robots as far as RTDE goes, written from the maker's guide: what a client asks for it sends.
+//! A controller of Universal Robots as far as RTDE is concerned, written from the manufacturer's guide: it sends what a
+//! client requests.
 
 use std::collections::BTreeMap;
 use std::io::{ErrorKind, Read as _, Write as _};
@@ -10,16 +11,16 @@ use std::time::{Duration, Instant};
 
 use super::rtde_wire::{self as wire, Unpacker};
 
-/// What the controller shows and how it misbehaves.
+/// What the controller reports and how it misbehaves.
 #[derive(Debug, Clone)]
 pub struct RtdeScript {
     /// Major, minor, bug fix, build.
     pub software: [u32; 4],
     /// Outputs by name; all others are of the type NOT_FOUND.
     pub outputs: BTreeMap<&'static str, Output>,
-    /// After so many values the stream stops, and the connection stays.
+    /// After this many values the stream stops, and the connection stays open.
     pub silent_after: Option<usize>,
-    /// After so many values the connection is closed.
+    /// After this many values the connection is closed.
     pub closes_after: Option<usize>,
 }
 
@@ -61,7 +62,7 @@ impl Output {
 }
 
 impl Default for RtdeScript {
-    /// A UR5e that stands still with a tool, software 5.15.
+    /// A UR5e at rest with a tool, software 5.15.
     fn default() -> Self {
         let outputs = [
             ("timestamp", Output::Time),

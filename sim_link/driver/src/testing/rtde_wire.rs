@@ -13,9 +13,9 @@ pub const REQUEST_PROTOCOL_VERSION: u8 = b'V';
 pub const GET_CONTROLLER_VERSION: u8 = b'v';
 /// A message for people, from the controller.
 pub const TEXT_MESSAGE: u8 = b'M';
-/// Values, as often as it was asked for.
+/// Values, at the requested rate.
 pub const DATA: u8 = b'U';
-/// Says which values are wanted, and how often.
+/// Selects the values and their rate.
 pub const SETUP_OUTPUTS: u8 = b'O';
 /// Says which values the client will write.
 pub const SETUP_INPUTS: u8 = b'I';

@@ -15,7 +15,7 @@ use handeye_wording::text;
 /// Longest wait for an image in one call: the camera worker has other tasks, too.
 const PATIENCE: Duration = Duration::from_millis(100);
 
-/// Depths \[m\] of a camera whose driver says nothing of them.
+/// Depths \[m\] of a camera whose driver does not report them.
 const USUAL_DEPTHS_M: [f32; 2] = [0.1, 10.0];
 
 pub(super) struct DriverCamera {
@@ -69,12 +69,12 @@ impl CameraPort for DriverCamera {
     }
 }
 
-/// Freehand, and nobody has said where the robot is.
+/// Freehand, and no pose of the robot was entered.
 fn nothing_typed() -> Text {
     text!("type the pose that its pendant shows, and capture again")
 }
 
-/// Why the states of a driver do not say where the robot was in an image.
+/// Why the states of a driver do not give the robot's pose at an image.
 fn no_pose(why: &NoPose) -> Text {
     let seconds = |s: f64| format!("{s:.3}");
     match *why {

@@ -14,7 +14,7 @@ use handeye_wording::text;
 pub(super) struct DriverControl {
     cell: DriverCell,
     typed: Option<TypedPose>,
-    /// As it was told last.
+    /// The placement that was reported last.
     placement: ChainPlacement,
 }
 

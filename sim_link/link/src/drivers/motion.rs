@@ -22,19 +22,19 @@ use crate::{JogRequest, MotionPort, PortError, Room, ViewsRequest};
 use handeye_wording::Text;
 use handeye_wording::text;
 
-/// Beyond its own length a step of the tip may be so far \[m\] from the straight way: the wrist turns about other axes than the
-/// tip, and a change of configuration swings the arm by more.
+/// In addition to its length a step of the tip may deviate by this \[m\] from the straight way: the wrist turns about other
+/// axes than the tip, and a change of configuration swings the arm by more.
 const STRAY_M: f64 = 0.02;
-/// Parts of the way at which that is looked at.
+/// Number of points of the way at which that is checked.
 const STRAY_SAMPLES: usize = 8;
 
 pub(super) struct DriverMotion {
     cell: DriverCell,
-    /// What a person keeps the arm out of.
+    /// Zones of the user that the arm must avoid.
     keep_out: Surroundings,
 }
 
-/// The arm where it stands now, where its chain of joints is known.
+/// The arm where it is now, where its chain of joints is known.
 struct Placed {
     kinematics: Arc<ArmKinematics>,
     joints: JointValues,
@@ -76,7 +76,7 @@ impl DriverMotion {
         }))
     }
 
-    /// What is known to stand around: what a person says, and the plane under the arm while it is above that, because an arm on a
+    /// The known obstacles: those of the user, and the plane under the arm while the arm is above it, because an arm on a
     /// pedestal reaches below its foot.
     fn around(&self, kinematics: &ArmKinematics, joints: &JointValues) -> Surroundings {
         let plane = kinematics.among(kinematics.plane(), None);
@@ -85,12 +85,12 @@ impl DriverMotion {
         if is_below { around } else { plane.around.and(around) }
     }
 
-    /// What is in the way of a motion that is about straight in joint space; nothing where that is not known.
+    /// What is in the way of a motion that is nearly straight in joint space; `None` where that is not known.
     fn obstacle(&self, goal: &Goal) -> Result<Option<Text>, PortError> {
         let Ok(Placed { kinematics, joints, around }) = self.placed()? else { return Ok(None) };
         let goal = match goal {
             Goal::Joints(goal) => *goal,
-            // Whether it is in reach is for the controller to say, whose limits count.
+            // The controller decides whether it is in reach, as its limits count.
             Goal::Tip(pose) => match kinematics.reach(pose, &joints) {
                 Ok(goal) => goal,
                 Err(_) => return Ok(None),
@@ -102,8 +102,8 @@ impl DriverMotion {
         Ok(contact.as_ref().map(contact_text))
     }
 
-    /// A goal in the terms in which the robot is moved: one that moves to joint values alone is sent to those that put its tip
-    /// there, by the chain of its joints.
+    /// The goal in the form that the robot accepts: for a robot that only moves to joint values, those that put its tip there,
+    /// by the chain of its joints.
     fn in_its_terms(&self, goal: Goal) -> Result<Result<Goal, Text>, PortError> {
         let Goal::Tip(pose) = goal else { return Ok(Ok(goal)) };
         if self.robot().hello().can(Ability::MoveTip) {
@@ -121,7 +121,7 @@ impl DriverMotion {
         }))
     }
 
-    /// Whether the tip stays near its straight way from here on a way that is straight in joint space: a small step is no swing of
+    /// Whether the tip stays near its straight way from here on a way that is straight in joint space: a small step must not swing
     /// the arm into another configuration.
     fn strays(&self, from: &Reading, goal: &Goal, along_m: f64) -> bool {
         let (Goal::Joints(to), Some(joints), Ok(kinematics)) = (goal, &from.joints, self.kinematics()) else {

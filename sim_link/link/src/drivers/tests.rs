@@ -23,7 +23,7 @@ fn served(part: FakePart) -> String {
     served_without(part, Vec::new())
 }
 
-/// The same of a driver that says that it cannot do some of it.
+/// The same for a driver that reports some abilities as missing.
 fn served_without(part: FakePart, cannot: Vec<Ability>) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
     let address = format!("tcp://{}", listener.local_addr().expect("bound"));
@@ -98,7 +98,7 @@ fn a_cell_behind_a_driver_is_seen_read_and_moved_once_somebody_allows_it() {
     control.stop().expect("a stop is always heard");
 }
 
-/// The arm as the workbench drives it, once it has stood.
+/// The arm as the workbench drives it, once it has been at rest.
 fn known_arm(control: &mut dyn ControlPort) -> ArmKinematics {
     loop {
         if let Some(arm) = control.facts().expect("connected").arm {
@@ -139,7 +139,7 @@ fn an_arm_whose_flange_is_reported_beside_its_tip_is_planned_for_and_keeps_out_o
     assert_eq!(motion.move_to(&goal, 0.5, &shutdown), Ok(MotionOutcome::Arrived));
 }
 
-/// As most makers' libraries have it.
+/// As in most manufacturers' libraries.
 #[test]
 fn an_arm_that_takes_joint_values_alone_is_jogged_along_axes_and_goes_to_poses_by_its_chain() {
     let connector = connector(Some(served_without(FakePart::Robot, vec![Ability::MoveTip])), None);

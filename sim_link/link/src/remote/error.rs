@@ -1,4 +1,4 @@
-//! What an error of the client means for a connection.
+//! The connection error for an error of the client.
 
 use handeye_coppeliasim::cell::Arm;
 use handeye_coppeliasim::{Connection, LinkError};
@@ -7,14 +7,14 @@ use crate::PortError;
 use handeye_wording::Text;
 use handeye_wording::text;
 
-/// Whether the cell is there, as far as is known without asking.
+/// Whether the cell is connected, as far as is known without a request.
 pub(crate) fn check_arm(arm: &mut Arm) -> Result<(), PortError> {
     check(arm.sim().connection())
 }
 
 pub(crate) fn port_error(error: LinkError) -> PortError {
     let text = match &error {
-        // Which call found out is of no interest when nobody is there for any call.
+        // Which call found out does not matter when no server answers any call.
         LinkError::Unreachable { endpoint, .. } => text!(
             "Nothing answers at {endpoint}. Start CoppeliaSim or a cell there, check that its ZMQ remote API add-on is \
              enabled and which port its status bar shows (usually 23000).",
@@ -47,8 +47,7 @@ pub(crate) fn port_error(error: LinkError) -> PortError {
     }
 }
 
-/// Whether the connection has to be made again: also where the server no longer knows this client, as after this computer was
-/// asleep.
+/// Whether a new connection is needed: also where the server no longer knows this client, as after this computer was asleep.
 pub(crate) fn is_lost(error: &LinkError) -> bool {
     error.is_connection_loss() || matches!(error, LinkError::Forgotten { .. })
 }
@@ -58,7 +57,7 @@ fn closed() -> Text {
     text!("The server closed the connection. Start it again if it has ended.")
 }
 
-/// Nobody has to do anything: this program starts it.
+/// No action is needed: this program starts it.
 fn own_cell_ended() -> Text {
     text!("The built-in cell has ended, and is started again")
 }

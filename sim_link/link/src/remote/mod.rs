@@ -23,7 +23,7 @@ use crate::{CellFacts, RobotState, Simulation};
 /// A cell over the remote API: the built-in one, which it starts, or one that runs.
 pub struct RemoteCell {
     cell: Server,
-    /// Where it has its parts.
+    /// Paths of its objects.
     paths: CellPaths,
     /// The built-in cell, once started. It ends with this connector.
     server: Mutex<Option<CellServer>>,
@@ -45,17 +45,17 @@ impl RemoteCell {
         Self { cell: Server::BuiltIn(scene, arm_errors), paths: CellPaths::default(), server: Mutex::new(None) }
     }
 
-    /// To a built-in cell that was started for this alone. It ends with this.
+    /// To a built-in cell that was started for this connection only. It ends with this.
     pub fn own(server: CellServer, objects: CellPaths) -> Self {
         Self { cell: Server::Own(server), paths: objects, server: Mutex::new(None) }
     }
 
-    /// To what runs at an address, and has its parts at `objects`.
+    /// To the server at an address, with the cell's objects at `objects`.
     pub fn at(address: String, objects: CellPaths) -> Self {
         Self { cell: Server::At(address), paths: objects, server: Mutex::new(None) }
     }
 
-    /// Where to connect to. Starts the built-in cell when that is needed; the other workers wait for the first.
+    /// The address to connect to. Starts the built-in cell when that is needed; the other workers wait for the first.
     fn endpoint(&self) -> Result<Endpoint, PortError> {
         let address = match &self.cell {
             Server::At(address) => address.clone(),
@@ -216,7 +216,8 @@ impl CameraPort for RemoteCamera {
         }
         let frame = match self.feed.grab() {
             Ok(frame) => frame,
-            // A machine under load is late; the next frame may be whole, and whoever waits for one has a limit.
+            // A machine under load is late; the next frame may be complete, and the one that waits for it has a time
+            // limit.
             Err(error @ LinkError::MixedInstants { .. }) => {
                 tracing::debug!(%error, "an image is left out");
                 return Ok(Newest::Awaited);

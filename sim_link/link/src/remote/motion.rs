@@ -25,9 +25,9 @@ const VIEWS_SEED: u64 = 1;
 pub(crate) struct RemoteMotion {
     arm: Arm,
     kinematics: Result<ArmKinematics, UnknownKinematics>,
-    /// What the cell says stands around, as it was when the connection was made.
+    /// The obstacles of the cell, as they were when the connection was made.
     obstacles_found: SceneObstacles,
-    /// All of it with what a person keeps the arm out of, and with what holds the board: plans are for one that stands.
+    /// All of them, the zones of the user, and what holds the board: plans are for a board at rest.
     around: Surroundings,
     /// The arm among all of it that does not go along with the board.
     among: Option<Among>,
@@ -36,7 +36,7 @@ pub(crate) struct RemoteMotion {
 }
 
 impl RemoteMotion {
-    /// Over an arm whose kinematics is looked at once.
+    /// With an arm, whose kinematics is read at once.
     pub fn new(mut arm: Arm) -> Result<Self, LinkError> {
         let kinematics = arm.kinematics()?;
         let obstacles_found = match &kinematics {
@@ -58,7 +58,7 @@ impl RemoteMotion {
         Ok(live)
     }
 
-    /// From the next motion on: to what stands around and to what a person keeps it out of.
+    /// Obstacles and the zones of the user apply from the next motion on.
     fn keep_to(&mut self, keep_out: &Surroundings) {
         let Ok(kinematics) = &self.kinematics else { return };
         self.around = self.obstacles_found.all().and(keep_out.clone());
@@ -66,7 +66,7 @@ impl RemoteMotion {
         self.arm.keep_clear(self.among.clone());
     }
 
-    /// Whether there is a way, before anything moves. What the arm cannot do is `Some` reason.
+    /// Checks for a way before anything moves. `Some` is the reason why there is none.
     fn obstacle(&mut self, goal: &MotionGoal) -> Result<Option<Text>, LinkError> {
         let (MotionGoal::Tip(goal), Ok(kinematics)) = (goal, &self.kinematics) else { return Ok(None) };
         let joints = self.arm.joint_values()?;
@@ -110,7 +110,7 @@ impl RemoteMotion {
         self.arm.settle(&SettleOptions::default(), cancel).map(|_settled| ())
     }
 
-    /// A way to the goal where the direct one touches something; `None` where none is found.
+    /// A way to the goal where the direct one touches an obstacle; `None` where none is found.
     fn way_around(&mut self, goal: &MotionGoal, cancel: &CancelToken) -> Result<Option<Vec<JointValues>>, LinkError> {
         let start = self.arm.joint_values()?;
         let Some(among) = &self.among else { return Ok(None) };
@@ -202,7 +202,7 @@ impl MotionPort for RemoteMotion {
     }
 
     fn room(&mut self, board: &BoardInView) -> Result<Room, PortError> {
-        // Following says what is wrong with an arm of unknown kinematics.
+        // Following itself reports an arm of unknown kinematics.
         let Ok(kinematics) = &self.kinematics else { return Ok(Room::Enough) };
         let joints = self.arm.joint_values().map_err(port_error)?;
         let limits = FollowLimits::default();
@@ -308,14 +308,14 @@ pub fn end_of_following(end: &FollowEnd) -> Text {
     }
 }
 
-/// Why a share of the fastest speed is none.
+/// Why a share of the fastest speed is invalid.
 fn bad_speed(speed: f64) -> Option<Text> {
     let is_good = speed > 0.0 && speed <= 1.0;
     let percent = speed * 100.0;
     (!is_good).then(|| text!("{percent} % is not a speed: choose one over 0 % and up to 100 %", percent = percent))
 }
 
-/// What an error of the arm means for the motion; only a lost connection is an error here.
+/// The outcome of a motion for an error of the arm; only a lost connection is an error here.
 fn outcome_of(error: LinkError, cancel: &CancelToken) -> Result<MotionOutcome, PortError> {
     match error {
         LinkError::MotionStopped { .. } => Ok(MotionOutcome::Stopped),
@@ -334,7 +334,7 @@ fn outcome_of(error: LinkError, cancel: &CancelToken) -> Result<MotionOutcome, P
     }
 }
 
-/// What a person does about it, in the language of the window; what is rare stays in the words of the client.
+/// What the user can do about it, in the language of the window; rare errors keep the text of the client.
 fn error_text(error: &LinkError) -> Text {
     match error {
         LinkError::NotRunning { state: SimulationState::Paused, .. } => {

@@ -1,5 +1,6 @@
 //! Functions of CoppeliaSim that a cell of this kind does not have. They are listed among the others, because clients
-//! build their objects from that list and say nothing useful about what is not in it, and say what to do instead.
+//! build their objects from that list and have no useful error for functions that are not in it, and their errors state
+//! what to do instead.
 
 use super::{ApiError, Call, Outcome, Table};
 

@@ -26,7 +26,7 @@ fn pose(pose: &Isometry3<f64>) -> Value {
     wire::floats(poses::to_numbers(pose, false))
 }
 
-/// What is true in this run, for tests and reports.
+/// The ground truth of this run, for tests and reports.
 ///
 /// `tip_from_camera` and `base_from_target` are poses `[x y z qx qy qz qw]` in metres, the camera in OpenCV's axes, the
 /// base being the world. They are where the objects are now, also after a client has moved them.
@@ -64,9 +64,9 @@ fn truth(call: &mut Call<'_>) -> Outcome {
 /// The pass that the images of the colour sensor show, all of one instant: `sim_time` in seconds, `joints` in radians
 /// and the pose `tip` as the controller had them, and `base_from_target`, where the board really was, hidden or not.
 ///
-/// What clients set between two passes is in the next moment, as it is in the next image. The map is empty while there
-/// is nothing in the images: before the first pass and after the end of a simulation. A part that a client has removed
-/// from the scene is missing.
+/// Values that clients set between two passes are in the next moment, as they are in the next image. The map is empty
+/// while there is nothing in the images: before the first pass and after the end of a simulation. A part that a client
+/// has removed from the scene is missing.
 fn moment(call: &mut Call<'_>) -> Outcome {
     let (tree, stage) = (&call.cell.world.tree, &call.cell.stage);
     let Some(shown) = tree.sensor(stage.camera)?.shown() else { return one(wire::map([])) };
@@ -100,8 +100,8 @@ fn intrinsics(camera: &Intrinsics) -> Value {
     ])
 }
 
-/// `joints` has what is off about each joint's frame, whose z is its axis: the axis' direction (a rotation vector along x and
-/// y) and place (x, y), the zero, and what the joint gives way by under the largest torque of gravity.
+/// `joints` has the errors of each joint's frame, whose z is its axis: the axis' direction (a rotation vector along x and y)
+/// and place (x, y), the zero, and the deflection of the joint under the largest torque of gravity.
 fn robot(errors: &RobotErrors) -> Value {
     let joints = errors.joints.iter().map(|joint| {
         wire::map([
@@ -135,9 +135,9 @@ fn set_board_pose(call: &mut Call<'_>) -> Outcome {
     nothing()
 }
 
-/// Has the board go along a path from where it stands, `{path, speed_m_s, size_m, tilt_deg, seed}` with all but the path
-/// optional, as in the scene file. A path that it is on is brought to rest meanwhile; `still` does only that. Without a
-/// seed it is the cell's. While the simulation is stopped this is for the next one only.
+/// Moves the board along a path from where it is, `{path, speed_m_s, size_m, tilt_deg, seed}` with all but the path
+/// optional, as in the scene file. A path under way is brought to rest meanwhile; `still` does only that. The default
+/// seed is the cell's. While the simulation is stopped this applies to the next one only.
 fn move_board(call: &mut Call<'_>) -> Outcome {
     const NAMES: [&str; 5] = ["path", "speed_m_s", "size_m", "tilt_deg", "seed"];
     let fields = call.args.map_or_empty(0)?;

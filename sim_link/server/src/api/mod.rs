@@ -48,7 +48,7 @@ pub enum Effect {
     Brake,
 }
 
-/// What a function gives back.
+/// Result of a function.
 pub type Outcome = Result<Answer, ApiError>;
 
 /// A function of the API.
@@ -100,7 +100,7 @@ impl Registry {
         Self { namespaces }
     }
 
-    /// What CoppeliaSim serves too.
+    /// Functions that CoppeliaSim has, too.
     pub fn coppeliasim_only() -> Self {
         let mut registry = Self::new();
         registry.namespaces.remove("handeye");
@@ -117,7 +117,7 @@ impl Registry {
         self.namespaces.get(namespace)?.functions.get(name).copied()
     }
 
-    /// What the simulator says to the call of something that is no function.
+    /// The simulator's error for a call of an unknown function.
     pub fn not_a_function(&self, name: &str) -> String {
         let constant = name.split_once('.').is_some_and(|(namespace, name)| {
             self.namespaces.get(namespace).is_some_and(|namespace| namespace.constants.contains_key(name))
@@ -134,7 +134,7 @@ impl Registry {
         self.namespaces.contains_key(name)
     }
 
-    /// What a namespace offers, in the form that clients build their own objects from.
+    /// The functions of a namespace, in the form from which clients build their objects.
     pub fn info(&self, name: &str) -> Option<Value> {
         let Namespace { functions, constants } = self.namespaces.get(name)?;
         let functions = functions.keys().map(|&name| (name, wire::map([("func", Value::Map(Vec::new()))])));

@@ -23,7 +23,7 @@ pub(super) const FUNCTIONS: Table = &[
 /// Degrees of freedom that one motion may have.
 const MAX_DOFS: usize = 64;
 
-/// Which form the call had: the map of 4.7, or positions.
+/// Form of the call: the map of 4.7, or positions.
 #[derive(Debug, Clone)]
 enum Form {
     Map,

@@ -24,7 +24,7 @@ pub(super) const FUNCTIONS: Table = &[
     ("moveToPose_cleanup", motion_cleanup),
 ];
 
-/// What a callback of the positional form gets a pose as.
+/// Notation of a pose for a callback of the positional form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Notation {
     Pose,
@@ -155,7 +155,7 @@ impl Plan for PosePlan {
 
 impl ArmIk {
     /// Puts the target to a pose in the world, and the joints to where the tip meets it. If there is no such place
-    /// nearby, the joints stay where they are and nothing is reported, as the simulator has it.
+    /// nearby, the joints stay where they are and nothing is reported, as in the simulator.
     fn follow(&self, cell: &mut Cell, world_from_goal: &Isometry3<f64>) -> Result<(), ApiError> {
         cell.world.tree.set_world_pose(self.target, world_from_goal)?;
         let tree = &cell.world.tree;
@@ -307,7 +307,7 @@ fn from_map(call: &mut Call<'_>, fields: &Fields<'_>) -> Result<Motion, ApiError
     Ok(Motion::new(Box::new(plan), fields.callback("callback"), time_step_s))
 }
 
-/// A pose or a matrix, told apart by the number of numbers.
+/// A pose or a matrix, distinguished by the number of numbers.
 fn either(call: &Call<'_>, at: usize) -> Result<(Isometry3<f64>, Notation), ApiError> {
     if call.args.numbers(at)?.len() == 7 {
         Ok((poses::from_numbers(&call.args.array(at)?, false)?, Notation::Pose))

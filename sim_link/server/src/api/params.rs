@@ -61,7 +61,7 @@ mod vision {
     pub const DEPTH_IGNORED: i64 = 1021;
 }
 
-/// Of a shape: the corner with the smallest coordinates, x, y, z, and then that with the largest.
+/// Bounding box of a shape: the corner with the smallest coordinates, x, y, z, and then that with the largest.
 const BOUNDS: std::ops::RangeInclusive<i64> = 15..=20;
 
 /// The cell has no files, so all paths are empty.

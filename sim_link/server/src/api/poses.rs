@@ -20,7 +20,7 @@ pub(super) const FUNCTIONS: Table = &[
     ("setObjectMatrix", set_object_matrix),
 ];
 
-/// The pose that a getter asks for, and the handle with its flags.
+/// The pose requested by a getter, and the handle with its flags.
 fn asked(call: &Call<'_>) -> Result<(Isometry3<f64>, Flagged), ApiError> {
     let object = Flagged::parse(call.args.handle(0)?);
     let relative_to = call.args.integer_or(1, poses::HANDLE_WORLD)?;
@@ -52,7 +52,7 @@ fn get_object_matrix(call: &mut Call<'_>) -> Outcome {
     one(wire::floats(poses::to_matrix(&asked(call)?.0)))
 }
 
-/// What a setter is told: the object, what the value is relative to, and at which position the value is.
+/// Arguments of a setter: the object, what the value is relative to, and at which position the value is.
 ///
 /// The value comes second and the reference third, or, in the old order, the other way round.
 fn pose_arguments(call: &Call<'_>) -> Result<(Flagged, i64, usize), ApiError> {
@@ -61,7 +61,7 @@ fn pose_arguments(call: &Call<'_>) -> Result<(Flagged, i64, usize), ApiError> {
         return Ok((object, call.args.integer_or(2, poses::HANDLE_WORLD)?, 1));
     }
     let relative_to = call.args.integer(1)?;
-    // Without a table anywhere the value is what is missing.
+    // Without a table the missing argument is the value.
     if call.args.len() < 3 { Err(ApiError::TooFewArguments) } else { Ok((object, relative_to, 2)) }
 }
 
@@ -104,7 +104,7 @@ fn set_object_pose(call: &mut Call<'_>) -> Outcome {
 fn set_object_matrix(call: &mut Call<'_>) -> Outcome {
     set(call, |call, at, _, _| {
         let numbers = call.args.numbers(at)?;
-        // A 4×4 matrix as some scripts send it: the last row says nothing.
+        // A 4×4 matrix as some scripts send it: the last row is ignored.
         let numbers = numbers.get(..12).filter(|_| matches!(numbers.len(), 12 | 16)).ok_or(ApiError::WrongSize)?;
         let matrix: [f64; 12] = numbers.try_into().ok().ok_or(ApiError::WrongSize)?;
         Ok(poses::from_matrix(&matrix)?)

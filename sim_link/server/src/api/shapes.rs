@@ -45,7 +45,7 @@ pub(super) fn bounds(cell: &Cell, handle: Handle) -> [Point3<f64>; 2] {
     bounds.unwrap_or([Point3::origin(); 2])
 }
 
-/// Points whose box is that of a solid; none for one without end.
+/// Points whose box is that of a solid; none for an infinite one.
 fn corners(shape: &Shape, object_from_shape: &Isometry3<f64>) -> Vec<Point3<f64>> {
     let of_box = |half: Vector3<f64>| -> Vec<Point3<f64>> {
         let signs = [-1.0, 1.0];

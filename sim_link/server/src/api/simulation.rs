@@ -119,7 +119,7 @@ fn add_log(call: &mut Call<'_>) -> Outcome {
     nothing()
 }
 
-/// Calls a function of the client with two values, 99 times unless told otherwise, and once more for its result.
+/// Calls a function of the client with two values, 99 times by default, and once more for its result.
 fn test_cb(call: &mut Call<'_>) -> Outcome {
     const MAX_ITERATIONS: i64 = 100_000;
     let name = call.args.callback(1).ok_or(ApiError::WrongType { number: 2, expected: "a function" })?;

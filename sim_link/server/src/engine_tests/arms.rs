@@ -32,7 +32,7 @@ fn ur3e() -> Scene {
     Scene::from_toml(text).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// A UR5 as ROS has it: its axes are not the z axes of its frames.
+/// A UR5 as in ROS: its axes are not the z axes of its frames.
 fn ur5_of_ros() -> Scene {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../core/arm/src/testing/arms/ur5.urdf");
     let text = format!(

@@ -1,4 +1,4 @@
-//! The board that moves, hides, and is where the moment of an image says.
+//! The board that moves, hides, and is where the moment of an image reports it.
 
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Camera, PointIn, Pose, Target, Tip};
@@ -172,7 +172,7 @@ fn the_image_shows_the_board_where_the_moment_says_while_board_and_arm_move() {
             worst = worst.max(reprojection_error(&mut bench, &resolved));
         }
     }
-    // 0.15 m/s at 0.38 m: a moment that is one pass off is off by 11 pixels.
+    // 0.15 m/s at 0.38 m: an error of one pass in the moment is an error of 11 pixels.
     assert!(worst < 0.1, "{worst} px");
 }
 

@@ -16,7 +16,7 @@ struct Bench {
     engine: Engine,
     now: Duration,
     replies: Vec<Outgoing>,
-    /// How often clients were asked to wait.
+    /// Number of requests to wait.
     waits: usize,
 }
 
@@ -55,8 +55,8 @@ impl Bench {
         self.engine.receive(&peer(uuid), &request(uuid, func, args), self.now);
     }
 
-    /// Takes what the engine has said. Clients that are asked to wait say that they do, as all of the vendor's do; `true`
-    /// if there were any.
+    /// Takes the engine's messages. Clients that are asked to wait confirm that, as all of the vendor's do; `true` if
+    /// there were any.
     fn listen(&mut self) -> bool {
         let (asked, reported): (Vec<_>, Vec<_>) =
             self.engine.take_outgoing().into_iter().partition(|(_, bytes)| *bytes == message::wait());
@@ -125,7 +125,7 @@ impl Bench {
         reply.get("err").and_then(Reader::text).unwrap_or_else(|| panic!("{func} gave {reply:?}")).to_owned()
     }
 
-    /// Whether a pass comes by itself, as soon as nobody asks for anything more.
+    /// Whether a pass comes by itself, as soon as there are no more requests.
     fn is_pass_near(&self) -> bool {
         matches!(self.engine.due(), Due::At(time) if time <= self.now + REQUEST_GRACE * 2)
     }
@@ -449,7 +449,7 @@ fn the_ids_of_one_connection_take_only_their_share_and_go_with_it() {
     assert_eq!(bench.engine.clients.records.len(), MAX_CLIENTS_PER_CONNECTION);
     assert_eq!(refused, 2 * MAX_CLIENTS - MAX_CLIENTS_PER_CONNECTION);
     bench.call(A, "sim.startSimulation", vec![]);
-    // All of them are gone with their connection, not only the last that spoke: nobody holds the passes now.
+    // All of them are gone with their connection, not only the last one with a message: no client holds the passes now.
     bench.engine.disconnected(&crowd, bench.now);
     bench.now += Duration::from_secs(3);
     bench.turn();

@@ -309,7 +309,7 @@ fn an_object_moves_relative_to_another() {
     let state = bench.get("sim.moveToPose", vec![params]);
     assert!(state.get("dist").and_then(Reader::number).expect("there") > 0.3);
     let position = bench.get("sim.getObjectPosition", vec![dummy]).numbers().expect("three numbers");
-    // The arm stands at 0.025 m.
+    // The arm is at 0.025 m.
     for (a, b) in position.iter().zip([0.1, 0.2, 0.325]) {
         assert!((a - b).abs() < 1e-9);
     }
@@ -371,7 +371,7 @@ fn a_client_that_vanishes_during_a_move_leaves_a_braking_arm_and_no_frozen_time(
         bench.turn();
     }
     bench.engine.disconnected(&peer(A), bench.now);
-    // The pass that it had asked for still comes.
+    // The pass that it had requested still comes.
     bench.turn();
     let frozen_at = bench.time_s();
     bench.turn();

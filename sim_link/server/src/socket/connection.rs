@@ -11,11 +11,11 @@ use super::zmtp::{self, Decoder, Event, Violation};
 /// How long a connection may take to introduce itself.
 const HANDSHAKE_LIMIT: Duration = Duration::from_secs(10);
 
-/// What a client asks for.
+/// A client's request.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Incoming {
     Request(Vec<u8>),
-    /// A request of so many bytes, which was not kept.
+    /// A request of this many bytes, which was discarded.
     TooLong(usize),
 }
 
@@ -25,16 +25,16 @@ pub enum CloseReason {
     /// The other side closed it.
     #[error("the other side closed it")]
     Closed,
-    /// The system says that it is broken.
+    /// The operating system reports that it is broken.
     #[error("it is broken: {0}")]
     Broken(ErrorKind),
-    /// The other side does not speak as a client does.
+    /// The other side does not behave like a client.
     #[error(transparent)]
     Violation(#[from] Violation),
-    /// The other side said nothing.
+    /// The other side sent no introduction.
     #[error("it did not introduce itself within {HANDSHAKE_LIMIT:?}")]
     NoIntroduction,
-    /// The other side says nothing now.
+    /// The other side no longer answers.
     #[error("it does not answer pings")]
     Silent,
     /// It holds what others need.
@@ -48,7 +48,7 @@ pub struct Connection {
     stream: TcpStream,
     silence: Duration,
     decoder: Decoder,
-    /// Bytes that have come and were not looked at, from `read` on.
+    /// Received bytes that were not decoded yet, from `read` on.
     inbox: Vec<u8>,
     read: usize,
     outbox: VecDeque<Parcel>,
@@ -86,7 +86,7 @@ impl Parcel {
 }
 
 impl Connection {
-    /// A connection that was made just now, and is given up when it leaves a ping unanswered for so long.
+    /// A connection that was made just now, and is closed when it leaves a ping unanswered for `silence`.
     pub fn new(stream: TcpStream, silence: Duration, now: Duration) -> Self {
         let mut connection = Self {
             stream,
@@ -106,7 +106,7 @@ impl Connection {
         connection
     }
 
-    /// The system says that it can go on.
+    /// The operating system reports that it can go on.
     pub fn note(&mut self, event: &mio::event::Event) {
         self.may_read |= event.is_readable() || event.is_read_closed() || event.is_error();
         self.may_write |= event.is_writable() || event.is_write_closed() || event.is_error();
@@ -206,7 +206,8 @@ impl Connection {
         Ok(())
     }
 
-    /// Goes on sending after the system said that it can. That there is room again is a sign of life: somebody reads.
+    /// Goes on sending after the operating system reported that it can. Free space in the buffer is a sign of life: the
+    /// other side reads.
     ///
     /// # Errors
     /// [`CloseReason`].
@@ -239,7 +240,7 @@ impl Connection {
         self.decoder.knows_pings().then_some(next)
     }
 
-    /// Asks a silent client for a sign of life, and gives up one that gives none.
+    /// Sends a ping to a silent client, and closes the connection to one that does not answer.
     ///
     /// # Errors
     /// [`CloseReason`].

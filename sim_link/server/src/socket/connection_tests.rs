@@ -53,7 +53,7 @@ impl Pair {
         bytes
     }
 
-    /// One turn of the loop, in which the system says that everything can go on.
+    /// One turn of the loop, in which the operating system reports that everything can go on.
     fn turn(&mut self, now: Duration) -> Result<Option<Incoming>, CloseReason> {
         (self.here.may_read, self.here.may_write) = (true, true);
         self.here.resume(now)?;

@@ -1,8 +1,8 @@
 //! The socket of the server and the loop around it.
 //!
-//! The remote API is spoken over a ROUTER socket of ZeroMQ. This is one of its own making, because the library's cannot
-//! say how much memory its replies hold and cannot end one connection: a client that asks for images and reads none
-//! would be given some of either for ever.
+//! The remote API uses a ROUTER socket of ZeroMQ. This is a separate implementation, because the library's does not
+//! report the memory of its replies and cannot close a single connection: a client that requests images and reads none
+//! would use up both without limit.
 
 mod connection;
 mod zmtp;
@@ -25,7 +25,7 @@ use connection::{CloseReason, Connection, Incoming};
 const MAX_CONNECTIONS: usize = 256;
 
 /// What all connections together may hold in memory: replies that are not read yet, and requests that have not come
-/// whole. A reply has 32 MB at most. Whoever has kept the server waiting longest is let go first.
+/// whole. A reply has 32 MB at most. The connection that has kept the server waiting longest is closed first.
 const BUDGET_BYTES: usize = 64 << 20;
 
 /// Requests of one connection before the others get their turn.
@@ -96,7 +96,7 @@ impl Loop {
         self.address
     }
 
-    /// Serves until it is told to stop.
+    /// Serves until it is stopped.
     pub fn run(mut self) {
         let mut events = Events::with_capacity(MAX_CONNECTIONS);
         loop {
@@ -248,7 +248,7 @@ impl Loop {
     }
 }
 
-/// A socket that listens on an address or a host name; `*` stands for all addresses, as it does in ZeroMQ.
+/// A socket that listens on an address or a host name; `*` means all addresses, as in ZeroMQ.
 fn listen(bind: &str, port: u16) -> Result<TcpListener, CellError> {
     let host = match bind {
         "*" => "0.0.0.0",

@@ -1,5 +1,5 @@
-//! ZMTP 3, what ZeroMQ sockets say to each other, as far as a server of requests needs it
-//! ([RFC 23](https://rfc.zeromq.org/spec/23/), [RFC 37](https://rfc.zeromq.org/spec/37/)). No socket, no clock.
+//! ZMTP 3, the protocol between ZeroMQ sockets, as far as a server of requests needs it ([RFC
+//! 23](https://rfc.zeromq.org/spec/23/), [RFC 37](https://rfc.zeromq.org/spec/37/)). No socket, no clock.
 //!
 //! ZeroMQ's own library also talks to peers of version 1, which begin with the length of a message. Nearly every text
 //! is such a beginning, so that a web page could command the cell by an HTTP request with the right bytes in its body.
@@ -35,10 +35,10 @@ const MECHANISM: [u8; 20] = *b"NULL\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0";
 /// The socket types that send requests with an empty delimiter.
 const ASKING_SOCKETS: [&[u8]; 3] = [b"REQ", b"DEALER", b"ROUTER"];
 
-/// Frames that are longer end the connection; requests that are merely too long get an error.
+/// Frames that are longer end the connection; shorter requests that are too long get an error.
 const MAX_FRAME_BYTES: u64 = 16 << 20;
 
-/// Longest command: there are no longer ones than the list of properties of a socket.
+/// Longest command: none is longer than the list of properties of a socket.
 const MAX_COMMAND_BYTES: u64 = 4096;
 
 /// Longest context of a ping, which its answer repeats.
@@ -65,7 +65,7 @@ pub enum Violation {
     Frame,
 }
 
-/// What has come in.
+/// A decoded part of the stream.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Event {
     /// The greeting is right: [`READY`] is due.
@@ -80,7 +80,7 @@ pub enum Event {
     Pong(Vec<u8>),
 }
 
-/// Where in the stream of bytes the decoder is.
+/// Position of the decoder in the stream of bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stage {
     Greeting,
@@ -95,7 +95,7 @@ pub struct Decoder {
     stage: Stage,
     is_ready: bool,
     pings: bool,
-    /// What has come of the greeting, a length or a command.
+    /// Received bytes of the greeting, a length or a command.
     kept: Vec<u8>,
     message: Message,
 }
@@ -106,7 +106,7 @@ struct Message {
     frames: usize,
     has_delimiter: bool,
     request_bytes: usize,
-    /// What has come of the second frame.
+    /// Received bytes of the second frame.
     request: Vec<u8>,
 }
 
@@ -117,7 +117,7 @@ impl Default for Decoder {
 }
 
 impl Decoder {
-    /// Whether the other side has introduced itself.
+    /// Whether the other side has sent its introduction.
     pub fn is_ready(&self) -> bool {
         self.is_ready
     }
@@ -127,7 +127,7 @@ impl Decoder {
         self.pings
     }
 
-    /// Whether a part of something has come and the rest is due.
+    /// Whether a part of a message has come and the rest is due.
     pub fn is_amid(&self) -> bool {
         self.stage != Stage::Flags || self.message.frames > 0
     }
@@ -183,7 +183,7 @@ impl Decoder {
     fn begin_frame(&mut self, flags: u8) -> Result<(), Violation> {
         let is_command = flags & COMMAND != 0;
         let is_known = flags & !(MORE | LONG | COMMAND) == 0;
-        // The first frame is the introduction, and a command stands alone.
+        // The first frame is the introduction, and a command is a single frame.
         if !is_known || (is_command && flags & MORE != 0) || (!is_command && !self.is_ready) {
             return Err(Violation::Frame);
         }
@@ -304,7 +304,7 @@ fn pong(context: &[u8]) -> Vec<u8> {
     pong
 }
 
-/// What goes before a reply of so many bytes: the delimiter and the head of the frame.
+/// Prefix of a reply of this many bytes: the delimiter and the head of the frame.
 pub fn reply_head(bytes: usize) -> Vec<u8> {
     let mut head = vec![MORE, 0];
     match u8::try_from(bytes) {

@@ -15,7 +15,7 @@ fn request(payload: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// All that comes of bytes that arrive in pieces of a size.
+/// All events of bytes that arrive in pieces of a size.
 fn read(bytes: &[u8], piece: usize) -> Result<Vec<Event>, Violation> {
     let mut decoder = Decoder::default();
     let mut events = Vec::new();

@@ -1,4 +1,4 @@
-//! The errors of a real arm by images alone, against the factory's own calibration, which its controller counts with.
+//! The errors of a real arm from images alone, compared with the factory's own calibration, which its controller uses.
 
 use handeye_arm::ArmKind;
 use handeye_detect::detect;
@@ -19,12 +19,12 @@ const VIEWS: usize = 24;
 
 struct Recorded {
     joints_rad: Vec<f64>,
-    /// As the controller has it.
+    /// As reported by the controller.
     flange: Pose<Base, Tip>,
     corners: Option<Corners>,
 }
 
-/// RMS distance \[mm\] and angle \[°\] between poses by some kinematics and those of the controller, where base and tip may be any.
+/// RMS distance \[mm\] and angle \[°\] between poses from some kinematics and those of the controller, with any base and tip.
 fn apart(poses: &[Pose<Base, Tip>], recorded: &[Recorded]) -> (f64, f64) {
     let pairs: Vec<PosePair> = poses
         .iter()
@@ -44,7 +44,7 @@ fn apart(poses: &[Pose<Base, Tip>], recorded: &[Recorded]) -> (f64, f64) {
     (rms(|it| it.0) * 1e3, rms(|it| it.1).to_degrees())
 }
 
-/// The controller knows where the tip really is within some tenths of a millimetre; the estimate is given joint values alone.
+/// The controller knows where the tip really is within some tenths of a millimetre; the estimate gets joint values only.
 #[test]
 fn images_and_joint_values_find_what_the_factory_measured() {
     let Some(data) = data_folder() else { return };

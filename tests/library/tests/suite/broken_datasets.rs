@@ -100,7 +100,7 @@ fn use_all(folder: &Path) -> Result<(), String> {
 
 type Mutation = fn(&Folder);
 
-/// What is broken, how, and what the message must say: the place first.
+/// What is broken, how, and what the message must contain: the place first.
 const DEFECTS: &[(&str, Mutation, &[&str])] = &[
     ("no description", |f| fs::remove_file(f.path("dataset.toml")).expect("remove"), &["dataset.toml"]),
     ("an empty description", |f| f.write("dataset.toml", "\n"), &["dataset.toml:", "is empty"]),

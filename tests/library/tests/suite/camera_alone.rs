@@ -13,7 +13,7 @@ use handeye_simulate::{BoardViews, SharedErrors};
 use nalgebra::{Matrix2, Vector2};
 
 const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.03 };
-/// Of how many standard deviations 95 % of a Gaussian's errors are.
+/// Number of standard deviations that contain 95 % of a Gaussian's errors.
 const HELD: f64 = 1.96;
 
 /// 1280×960 with a focal length of 1400 px.
@@ -35,7 +35,7 @@ fn found(observations: &Observations, calibration: &Calibration, code: FindingCo
     all.into_iter().find(|finding| finding.code == code)
 }
 
-/// Errors of fx, fy, cx, cy and the standard deviations that are stated for them.
+/// Errors of fx, fy, cx, cy and the standard deviations stated for them.
 fn errors(calibration: &Calibration) -> [(f64, f64); 4] {
     let camera_found = calibration.camera.expect("a camera");
     let (found, sigma, truth) = (camera_found.intrinsics, camera_found.sigma_px.expect("stated"), camera());
@@ -51,7 +51,7 @@ fn a_bent_board_is_named_with_its_bend_and_leaves_the_focal_length_where_it_is()
         let observations = bent.observations(15, seed);
         let calibration = solved(&observations);
         for (i, (error, sigma)) in errors(&calibration).into_iter().enumerate() {
-            // Four seeds and four numbers: four standard deviations are passed by chance in one of a thousand runs.
+            // Four seeds and four numbers: four standard deviations are exceeded by chance in one of a thousand runs.
             assert!(error.abs() < 4.0 * sigma, "seed {seed}, {i}: {error} ± {sigma}");
             assert!(sigma < 3.0, "seed {seed}, {i}: a flat model is off by 60 px, ± {sigma} says nothing");
         }
@@ -72,7 +72,7 @@ fn a_bent_board_is_named_with_its_bend_and_leaves_the_focal_length_where_it_is()
 
 #[test]
 fn a_flat_board_is_not_called_bent_whatever_its_corners_have_in_common() {
-    // By corners that err independently 58 of 100 such sessions would show a bend.
+    // With independent corner errors 58 of 100 such sessions would show a bend.
     let shared = Some(SharedErrors { part: 1.0, reach: 3.0 });
     for seed in 0..25 {
         let observations = BoardViews { shared, ..views() }.observations(10, seed);
@@ -93,7 +93,7 @@ fn what_is_stated_holds_when_neighbouring_corners_err_alike() {
         let fit = calibration.camera_fit.expect("estimated");
         assert!(fit.times > 1.5, "seed {seed}: the scatter of the views shows it, {fit:?}");
     }
-    // 120 numbers, of which sixty or so are independent: 95 ± 2.8 %, and three of these; independent errors hold 34 %.
+    // 120 numbers, of which sixty or so are independent: 95 ± 2.8 %, and three of these; independent errors cover 34 %.
     assert!(held as f64 > 0.865 * 4.0 * SESSIONS as f64, "{held}");
 }
 
@@ -132,7 +132,7 @@ fn corners_count_by_what_their_detector_states() {
     let (mut by_statement, mut alike) = (0.0, 0.0);
     for seed in 0..6 {
         let mut observations = views().observations(8, 40 + seed);
-        // Every other corner is ten times as noisy, told by the difference to another draw of the same scene.
+        // Every other corner is ten times as noisy, as shown by the difference to another draw of the same scene.
         let louder = BoardViews { noise_px: 1.0, ..views() }.observations(8, 40 + seed);
         for (view, loud) in observations.views.iter_mut().zip(&louder.views) {
             let corners = view.corners.as_mut().expect("corners").iter_mut();

@@ -39,7 +39,7 @@ fn every_degenerate_or_hostile_session_gets_its_code_and_none_is_called_healthy(
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Leaves of every template its values alone.
+/// Keeps only the values of every template.
 #[derive(Clone, Copy)]
 struct ValuesOnly;
 
@@ -61,7 +61,7 @@ fn healthy_sessions_raise_no_alarm() {
     }
 }
 
-/// A session of a simulator: an exact robot, whose poses are written to a micrometre, and corners as a renderer draws them, to
+/// A session of a simulator: an exact robot, whose poses are written to a micrometre, and corners as from a renderer, to
 /// thousandths of a pixel; one image is a little worse, and one corner in it.
 fn simulated(mode: Mode, estimated: bool, seed: u64) -> Observations {
     let exact = Setup { noise: Noise::EXACT, estimated, ..Setup::new(mode, 12, seed) };
@@ -86,7 +86,7 @@ fn simulated(mode: Mode, estimated: bool, seed: u64) -> Observations {
     session
 }
 
-/// A number that is nothing but zeros, with decimals: a value that is too small for how it is printed.
+/// A number with only zeros, with decimals: a value that is too small for its format.
 fn printed_zero(text: &str) -> Option<&str> {
     let numbers = text.split(|c: char| !(c.is_ascii_digit() || c == '.'));
     numbers.filter(|word| word.contains('.') && word.len() > 2).find(|word| word.trim_matches(['0', '.']).is_empty())
@@ -107,7 +107,7 @@ fn an_exact_simulation_has_no_outlier_no_finding_and_no_printed_zero() {
                 use FindingCode as C;
                 let geometry =
                     [C::PoorCoverage, C::WeakDirection, C::LittleTilt, C::WeakRotation, C::ClosedFormsDisagree];
-                // Of a lens that is given nothing says how good it is.
+                // Nothing states how good a given lens is.
                 let of_input = [C::UncertaintyWidened, C::LensTakenAsExact];
                 !geometry.contains(&finding.code) && !of_input.contains(&finding.code)
             };
@@ -124,8 +124,8 @@ fn an_exact_simulation_has_no_outlier_no_finding_and_no_printed_zero() {
 
 #[test]
 fn an_arm_whose_error_depends_on_where_it_stands_raises_no_alarm() {
-    // One in fifty sessions like these has a cause named; one in eleven without a model of such errors, among them the
-    // tenth of these.
+    // One in fifty sessions like these gets a cause reported; one in eleven without a model of such errors, among them
+    // the tenth of these.
     for seed in 20_000..20_012 {
         let (observations, setup) = faults::as_met(seed);
         let findings = faults::examined(&observations).findings;
@@ -136,8 +136,8 @@ fn an_arm_whose_error_depends_on_where_it_stands_raises_no_alarm() {
 
 #[test]
 fn links_of_an_arm_that_are_too_long_are_no_other_size_of_the_target() {
-    // Sessions in which the arm moves too far by some tenths of a percent: a field in the axes of the tip alone does not follow
-    // that, and calls the target too small.
+    // Sessions in which the arm moves too far by some tenths of a percent: a field in the axes of the tip alone does not fit
+    // that, and reports the target as too small.
     for seed in [30_184, 30_287, 30_424] {
         let (observations, setup) = faults::as_met(20_000 + seed);
         let findings = faults::examined_alone(&observations).findings;
@@ -149,8 +149,8 @@ fn links_of_an_arm_that_are_too_long_are_no_other_size_of_the_target() {
 fn each_injected_fault_is_ranked_first() {
     for (fault, name) in faults::FAULTS.iter().enumerate() {
         for seed in 0..2 {
-            // Twice as large as their names say: half of the sessions with a fixed camera have a joint that is 0.2° off first and
-            // accepted (docs/studies/diagnosis.md).
+            // Twice as large as their names state: half of the sessions with a fixed camera have a joint that is 0.2° off
+            // initially and accepted (docs/studies/diagnosis.md).
             let (observations, code) = faults::faulty(fault, 2.0, seed);
             let diagnosis = faults::examined_alone(&observations);
             let best = diagnosis.hypotheses.first().expect("tested");
@@ -162,7 +162,8 @@ fn each_injected_fault_is_ranked_first() {
 #[test]
 fn the_scale_is_estimated_within_its_uncertainty_with_the_lens_given_estimated_or_absent() {
     // Squared error over squared uncertainty has the mean 1; its spread over 12 sessions is 0.4 for a Gaussian. Poses
-    // alone say nothing of their precision, so all of it is taken for the robot's, and the uncertainty is too large.
+    // alone contain nothing about their precision, so all of it is attributed to the robot, and the uncertainty is too
+    // large.
     let mean = |errors: Vec<f64>| errors.iter().sum::<f64>() / errors.len() as f64;
     let seeds = || 700..712u64;
     let of_corners = |estimated| mean(seeds().filter_map(|seed| faults::scale_error(estimated, seed)).collect());
@@ -194,7 +195,7 @@ fn a_report_has_one_size_of_the_target_and_on_a_bent_board_it_sets_no_headline()
             let reported = diagnosis.hypotheses.iter().find(|h| h.code == FindingCode::WrongScale);
             if let Some(estimate) = reported.and_then(|h| h.estimate) {
                 told_of_size += 1;
-                // But for the rounding of a difference to one.
+                // Up to the rounding of a difference to one.
                 let apart = |a: f64, b: f64| (a - b).abs() / b;
                 assert!(apart(estimate.value, size.scale) < 1e-9, "{mode:?} {seed}: {estimate:?} {size:?}");
                 assert!(estimate.sigma.is_some_and(|sigma| apart(sigma, size.sigma) < 1e-9), "{mode:?} {seed}");
@@ -202,8 +203,8 @@ fn a_report_has_one_size_of_the_target_and_on_a_bent_board_it_sets_no_headline()
             let is_accused = diagnosis.findings.iter().any(|finding| finding.code == FindingCode::WrongScale);
             assert_eq!(is_accused, scale > 0.0, "{mode:?} {seed}: {size:?} {reported:?}");
             assert!((size.scale - 1.0 - scale).abs() < 5.0 * size.sigma + 1e-4, "{mode:?} {seed}: {size:?}");
-            // Of a size that is wrong and not in the answer the error counts how far it moves it. Where the lens is estimated on a
-            // bent board something else may be found beside it.
+            // For a wrong size that is not in the answer the error includes how far it moves the answer. If the lens is estimated
+            // on a bent board something else may be found in addition.
             let is_moved = calibration.moved_m().is_some();
             let right = if estimated { is_moved || scale == 0.0 } else { is_moved == (scale > 0.0) };
             assert!(right, "{mode:?} {seed}: {:?}", calibration.stated_uncertainty());
@@ -214,7 +215,7 @@ fn a_report_has_one_size_of_the_target_and_on_a_bent_board_it_sets_no_headline()
 
 #[test]
 fn where_the_field_of_the_robot_leaves_the_size_open_the_stated_error_counts_what_it_would_move() {
-    // Two centimetres and a degree a metre, one way or the other.
+    // Two centimetres and a degree a metre, with either sign.
     let per_metre = SMatrix::from_fn(|i, j| if (i + 2 * j) % 3 == 0 { 0.02 } else { -0.014 });
     let setup = Setup { arm_error: ArmError::Affine(per_metre), ..Setup::new(Mode::EyeInHand, 20, 950) };
     let observations = observed(&setup);
@@ -224,7 +225,7 @@ fn where_the_field_of_the_robot_leaves_the_size_open_the_stated_error_counts_wha
     let size = joint.size.clone().expect("the robot moved");
     assert!(joint.field.is_some() && size.is_determined() && joint.open_size().is_none(), "{size:?}");
 
-    // The same answer of a session that says as little of the size as a ruler does.
+    // The same answer for a session that determines the size no better than a ruler does.
     let mut unsure = calibrated.clone();
     let with = Alternative { shift: [0.005, 0.0, 0.0, 0.0, 0.0, 0.0].into(), ..size.with.clone() };
     let open = TargetSize { scale: 1.02, sigma: 0.02, with, ..size };
@@ -239,8 +240,8 @@ fn where_the_field_of_the_robot_leaves_the_size_open_the_stated_error_counts_wha
     assert!(!sure.contains("Another size") && open.contains("1.020 ± 0.020 times"), "{sure}\n{open}");
 }
 
-/// What the answer is off by is what lies between it and the explanation, not between two fits of the linear model, of which
-/// neither is the answer.
+/// The error of the answer is its distance to the explanation, not that between two fits of the linear model, neither of
+/// which is the answer.
 #[test]
 fn the_error_beside_a_lens_that_was_given_wrongly_is_that_of_the_answer() {
     for seed in 1000..1006 {
@@ -256,7 +257,7 @@ fn the_error_beside_a_lens_that_was_given_wrongly_is_that_of_the_answer() {
     }
 }
 
-/// The same with target poses in the place of corners.
+/// The same with target poses instead of corners.
 fn scale_error_of_poses(seed: u64) -> Option<f64> {
     let setup = Setup::new(Mode::EyeInHand, 20, seed);
     let mut observations = observed(&setup.with(Fault { scale: 0.02, ..Fault::default() }));
@@ -302,7 +303,7 @@ fn what_was_not_tested_is_said_and_never_called_healthy() {
 
 #[test]
 fn the_weakest_direction_is_named_where_tilts_are_small() {
-    // Turns about the line of sight alone leave the place along it open; a few degrees of tilt leave it weak.
+    // Rotations about the line of sight alone leave the place along it open; a few degrees of tilt leave it weak.
     let cone = Cone { tilt_deg: 3.0, ..Cone::PUBLISHED };
     let setup = Setup { cone, ..Setup::new(Mode::EyeInHand, 20, 803) };
     let findings = faults::examined(&observed(&setup)).findings;
@@ -311,7 +312,7 @@ fn the_weakest_direction_is_named_where_tilts_are_small() {
     assert!(weak.to_string().contains("about the camera's x and y axes"), "{weak}");
 }
 
-/// The calibration as the command line makes it, with what may be claimed for it.
+/// The calibration as made by the command line, with what may be claimed for it.
 fn claimed(observations: &Observations) -> Calibration {
     let cancel = CancelToken::default();
     let goal = FindingOptions::with_goal_mm(Some(1.0));
@@ -339,16 +340,16 @@ fn the_stated_error_covers_the_true_one_when_what_was_given_is_wrong() {
             let error_m = (found.isometry() * point - true_mount_from_camera.isometry() * point).norm();
             let stated_m = calibration.tip_error_95_m().expect("stated");
             assert!(error_m < stated_m, "{name}, {seed}: off by {error_m}, stated {stated_m}");
-            // Not so wide that it says nothing: a slip looks like noise of the robot, too.
+            // Not so wide that it is useless: a slip looks like noise of the robot, too.
             let modelled_m = calibration.modelled_error_95_m().expect("stated");
-            // Where the field that explains it leaves the size of the board open, what that would move counts, too, and no more.
+            // If the field that explains it leaves the size of the board open, the shift by that counts, too, and no more.
             let joint = calibration.joint.as_ref().expect("a joint estimate");
             let by_size_m = joint.open_size().map_or(0.0, |size| {
                 let covariance = calibration.hand_eye_covariance().expect("stated");
                 let open = StatedUncertainty::Moved(vec![size.with.clone()]);
                 open.error_95_m(covariance, joint.small_sample, &point).expect("stated")
             });
-            // Beside an arm what all of its errors may shift the camera by is in no view, and counts however small it is.
+            // With an arm, the shift of the camera by all of its errors is in no view, and counts however small it is.
             let by_arm = joint.arm.as_ref().zip(calibration.hand_eye.as_ref()).filter(|_| mode == Mode::EyeToHand);
             let by_arm_m =
                 by_arm.map_or(0.0, |(arm, answer)| arm.of_links(answer)[0].error_95_m(arm.small_sample, &point));
@@ -392,7 +393,7 @@ fn the_goal_is_judged_by_the_error_that_is_stated_and_more_views_are_no_advice()
     assert!(goal.value("expected_error_95").expect("stated") > 15.0, "{goal:?}");
 }
 
-/// Radians that are read as degrees leave an arm that hardly turns, and a target of another unit a robot of another size.
+/// Radians that are read as degrees leave an arm that hardly turns, and a target in another unit a robot of another size.
 #[test]
 fn a_unit_that_was_stated_wrongly_is_named() {
     use nalgebra::{Isometry3, UnitQuaternion};
@@ -458,7 +459,7 @@ fn views_numbered_from_the_other_end_mislead_neither_closed_forms_nor_the_doctor
         for result in &calibration.methods {
             let found = result.outcome.as_ref().expect("an answer").mount_from_camera;
             let off_m = (found.translation() - true_mount_from_camera.translation()).norm();
-            // The least robust of them is off by a centimetre with all views as they should be.
+            // The least robust of them is off by a centimetre with all views correct.
             assert!(off_m < 0.03, "{method:?}: {} is off by {off_m} m", result.name);
         }
         let alarms: Vec<_> =
@@ -506,7 +507,7 @@ mod slow {
     }
 }
 
-/// As where edges are hard and a board lies along the pixels: all of it is off, which no residual shows.
+/// As with hard edges and a board along the pixels: all of it is shifted, which no residual shows.
 #[test]
 fn a_view_whose_corners_are_off_together_as_their_detector_says_contradicts_nothing() {
     let observations = observed(&Setup::new(Mode::EyeInHand, 16, 720));

@@ -1,4 +1,4 @@
-//! What the doctor says of recorded data: the faults that are known of them, and nothing else.
+//! What the doctor reports for recorded data: their known faults, and nothing else.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -39,7 +39,7 @@ fn corners(folder: &Path, target: &TargetSpec, detector: &str) -> BTreeMap<Strin
     by_image
 }
 
-/// The diagnosis of a set with its lens estimated, as the command line makes it.
+/// The diagnosis of a set with its lens estimated, as made by the command line.
 fn diagnosis(data: &Path, name: &str, detector: &str) -> Diagnosis {
     let folder = data.join(name);
     let dataset = Dataset::read(&folder).unwrap_or_else(|e| panic!("{e}"));
@@ -91,7 +91,7 @@ fn the_poor_circles_are_said_to_have_inconsistent_poses_and_no_cause_is_invented
     let diagnosis = diagnosis(&data, "rct_circles_eye_in_hand", "");
     let grave = grave(&diagnosis);
     assert!(grave.contains(&FindingCode::InconsistentPoses), "{grave:?}");
-    // Poses that scatter by half a centimetre say nothing of the size of the target.
+    // Poses that scatter by half a centimetre contain nothing about the size of the target.
     for code in [FindingCode::WrongScale, FindingCode::BoardMoved, FindingCode::CameraMoved] {
         assert!(!grave.contains(&code), "{grave:?}");
     }
@@ -107,7 +107,7 @@ fn good_sets_raise_no_false_alarm() {
     ] {
         let diagnosis = diagnosis(&data, name, detector);
         for finding in diagnosis.findings.iter().filter(|f| f.severity >= Severity::Warning) {
-            // In the corners that the set brings along, those of the first image are three times as far off as those of any
+            // In the corners supplied with the set, those of the first image are three times as far off as those of any
             // other; the second is at its limit.
             let known = ["images/im_26.png", "images/im_17.png"];
             assert!(finding.views.iter().all(|view| known.contains(&view.as_str())), "{name}: {finding}");

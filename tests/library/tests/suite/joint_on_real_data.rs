@@ -1,5 +1,5 @@
-//! The joint estimator against an independent implementation of the same model (`reference_nonlinear.NL_slack` of each
-//! data set: same corners, same camera, robot noise by an EM iteration) on real and rendered data.
+//! The joint estimator compared with an independent implementation of the same model (`reference_nonlinear.NL_slack` of
+//! each data set: same corners, same camera, robot noise by an EM iteration) on real and rendered data.
 
 use std::collections::BTreeMap;
 use std::path::Path;

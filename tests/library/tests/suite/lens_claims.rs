@@ -1,4 +1,4 @@
-//! What is said of a lens beside a robot; the study `lens_claims` does it at length.
+//! What is reported about a lens with a robot; the study `lens_claims` does it at length.
 
 #[expect(dead_code, reason = "the study draws more than is tested here")]
 #[path = "../../../studies/lens_claims/scene.rs"]
@@ -15,7 +15,7 @@ use scene::Scene;
 
 const MODES: [Mode; 2] = [Mode::EyeInHand, Mode::EyeToHand];
 
-/// As the command line makes it.
+/// As made by the command line.
 fn examined(observations: &Observations) -> (Calibration, Diagnosis) {
     let cancel = CancelToken::default();
     let calibration = calibrate(observations, Method::Joint, &cancel).expect("calibrates");
@@ -27,7 +27,7 @@ fn named(diagnosis: &Diagnosis, code: FindingCode) -> Option<&Finding> {
     diagnosis.findings.iter().find(|finding| finding.code == code)
 }
 
-/// Programs differ by half a pixel in where an image begins, and a lens of another one is off by that.
+/// Programs differ by half a pixel in where an image begins, and a lens from another program is off by that.
 #[test]
 fn a_given_lens_whose_centre_is_half_a_pixel_off_is_named_and_counted() {
     for mode in MODES {
@@ -51,7 +51,8 @@ fn a_given_lens_whose_centre_is_half_a_pixel_off_is_named_and_counted() {
     }
 }
 
-/// A dozen views by an arm that scatters by 0.1 mm tell hardly any centre from another, and half a pixel from none.
+/// A dozen views with an arm that scatters by 0.1 mm hardly distinguish one centre from another, and not half a pixel
+/// at all.
 #[test]
 fn half_a_pixel_is_named_where_another_centre_would_not_be() {
     let mut found = 0;
@@ -104,7 +105,7 @@ fn fx_and_fy_that_differ_by_more_than_those_of_a_camera_are_named() {
 fn fx_and_fy_of_a_camera_are_not_accused_where_views_tell_them_badly() {
     for mode in MODES {
         for seed in 0..3 {
-            // Twelve degrees of tilt at most, and no turns about the axis of the camera.
+            // At most twelve degrees of tilt, and no rotations about the axis of the camera.
             let scene = Scene { tilt_deg: 12.0, roll_deg: 5.0, shared_px: 0.1, ..Scene::new(mode, 8) };
             let session = scene.draw(seed);
             for observations in [session.alone(), session.unknown()] {
@@ -116,7 +117,8 @@ fn fx_and_fy_of_a_camera_are_not_accused_where_views_tell_them_badly() {
     }
 }
 
-/// Errors that the corners of a view share make the lens less known than independent corners say, and few views do not refute that.
+/// Errors shared by the corners of a view make the lens less well known than independent corners suggest, and few views do not
+/// refute that.
 #[test]
 fn what_views_say_of_the_lens_counts_where_their_corners_err_alike() {
     for print_m in [0.0, 1e-4] {
@@ -132,8 +134,8 @@ fn what_views_say_of_the_lens_counts_where_their_corners_err_alike() {
         };
         let mean = |shared_px| (0..6).map(|seed| checked(shared_px, seed)).sum::<f64>() / 6.0;
         let (alike, independent) = (mean(0.1), mean(0.0));
-        // One is right where corners err independently; six of some thirty degrees of freedom scatter by a tenth,
-        // and four tenths off is not by chance.
+        // One is right where corners err independently; six of some thirty degrees of freedom scatter by a tenth, and a
+        // deviation of four tenths is not by chance.
         assert!((0.6..1.4).contains(&independent), "{independent}");
         assert!(alike > 1.4, "{alike} where corners err alike");
     }

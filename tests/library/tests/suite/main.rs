@@ -1,6 +1,6 @@
 //! All integration tests of the core in one program, which is linked once.
 //!
-//! `slow` is what the fast tier (`./test fast`) leaves out.
+//! `slow` is what the fast tier (`./test fast`) skips.
 
 mod arm_recorded;
 mod broken_datasets;

@@ -1,4 +1,4 @@
-//! The reader on recorded data sets, where they are at hand.
+//! The reader on recorded data sets, if they are available.
 
 use handeye_dataset::Dataset;
 use handeye_geometry::testing::data_folder;

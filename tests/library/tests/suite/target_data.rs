@@ -21,7 +21,7 @@ fn found(image: &GrayImage, target: &TargetSpec) -> Corners {
     detect(image, target).expect("searches").unwrap_or_else(|| panic!("{target}: not found"))
 }
 
-/// Numbers of a file of ViSP's matrices: one in brackets a line.
+/// Numbers of a file of ViSP's matrices: one per line, in brackets.
 fn in_brackets(path: &Path) -> Vec<f64> {
     let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     let lines = text.lines().filter_map(|line| line.split_once('[')?.1.split_once(']'));
@@ -49,7 +49,7 @@ fn described(set: &Path, folder: &Path) {
 }
 
 /// Corners of the reference detector (OpenCV with `CORNER_REFINE_APRILTAG`), view by view: top left, top right, bottom
-/// right, bottom left of the marker as OpenCV reads it. Half a pixel is taken off, by which that method is shifted.
+/// right, bottom left of the marker as OpenCV reads it. Half a pixel is subtracted, by which that method is shifted.
 fn reference(set: &Path) -> Vec<[Vector2<f64>; 4]> {
     let text = std::fs::read_to_string(set.join("points.csv")).expect("reads");
     let pixel = |line: &str| {
@@ -107,8 +107,8 @@ fn tags_of_three_families_have_the_corners_of_the_apriltag_library() {
             let family = family.parse().expect("known");
             let tag = TargetSpec::AprilTag(AprilTag { tag_m: 0.1, id, family, border_bits: None });
             let corners = found(&image, &tag);
-            // The library begins at the bottom left and goes round against the clock; the centre of its first pixel is
-            // (0.5, 0.5).
+            // The library begins at the bottom left and goes counter-clockwise; the centre of its first pixel is (0.5,
+            // 0.5).
             for (index, line) in [2, 3, 1, 0].into_iter().zip(&lines[1..]) {
                 let numbers: Vec<f64> = line.split_whitespace().map(|n| n.parse().expect("a number")).collect();
                 let corner = corners.iter().find(|c| c.index == index).expect("found");
@@ -119,7 +119,7 @@ fn tags_of_three_families_have_the_corners_of_the_apriltag_library() {
         let rms = (apart.iter().map(Vector2::norm_squared).sum::<f64>() / apart.len() as f64).sqrt();
         println!("tag{name}: {} corners, mean {mean:?}, {rms:.3} px RMS from the library", apart.len());
         assert_eq!(apart.len(), 20, "{name}");
-        // Half a pixel in both is what a mixed-up convention makes.
+        // Half a pixel in both would be the result of a mixed-up convention.
         assert!(rms < 0.3 && mean.norm() < 0.15, "{name}: mean {mean:?}, {rms} px RMS");
     }
 }
@@ -143,7 +143,7 @@ fn charuco_boards_of_others_are_found_whole() {
         let corners = found(&image, &TargetSpec::Charuco(board));
         // All of the first; two at the rim of the second are blurred beyond a fit.
         assert!(corners.len() >= 22, "{file}: {}", corners.len());
-        // Both have an odd number of rows of squares, for which the layouts are one.
+        // Both have an odd number of rows of squares, for which the layouts are the same.
         assert_eq!(charuco_layout(&image, &board).expect("searches"), Some(Layout::New));
         // A flat board through a good lens: a homography explains its corners to a fraction of a pixel.
         let camera = handeye_geometry::camera::Intrinsics::pinhole(640, 480, 600.0);

@@ -66,8 +66,8 @@ fn reference_corners(path: &Path, detector: &str) -> BTreeMap<String, Vec<Vector
     all
 }
 
-/// RMS per axis of the distance to the reference, whichever end the reference begins at, without the common shift,
-/// and that shift.
+/// RMS per axis of the distance to the reference, whichever end the reference starts at, without the common shift, and
+/// that shift.
 fn difference(corners: &[Corner], reference: &[Vector2<f64>]) -> (f64, Vector2<f64>) {
     let n = reference.len() as f64;
     let of = |at: &dyn Fn(usize) -> Vector2<f64>| {
@@ -80,8 +80,9 @@ fn difference(corners: &[Corner], reference: &[Vector2<f64>]) -> (f64, Vector2<f
     if same.0 < turned.0 { same } else { turned }
 }
 
-/// What is asked of a data set. RMS: what `calibrateCamera` leaves with the better of OpenCV's two detectors, or less
-/// where ours is clearly better. Focal length: the truth of rendered sets, the published or OpenCV's figure of others.
+/// Requirements for a data set. RMS: the residual of `calibrateCamera` with the better of OpenCV's two detectors, or
+/// less where ours is clearly better. Focal length: the truth of rendered sets, the published or OpenCV's figure of
+/// others.
 struct Expected {
     folder: &'static str,
     images: &'static str,

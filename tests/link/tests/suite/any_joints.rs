@@ -1,4 +1,4 @@
-//! Arms that have not six joints, or not only revolute ones, driven over the real socket: a Panda, and an arm on a track.
+//! Arms without six joints, or with prismatic ones, driven over the real socket: a Panda, and an arm on a track.
 
 use std::path::Path;
 use std::sync::mpsc::channel;
@@ -16,9 +16,9 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::other_arms::Bench;
 
-/// Only a failure takes so long.
+/// Only a failure takes this long.
 const PATIENCE: Duration = Duration::from_mins(1);
-/// How far from its line a jog or a motion may be: what a person sees at the tip with a dial gauge.
+/// How far from its line a jog or a motion may be: what a dial gauge at the tip shows.
 const STRAIGHT_M: f64 = 0.2e-3;
 /// A searched pose agrees to 1e-8 m and rad.
 const SEARCHED_M: f64 = 1e-7;
@@ -27,7 +27,7 @@ fn panda() -> Bench {
     Bench::shipped("panda.toml")
 }
 
-/// An arm on a track: a rail of 1.6 m, on which an xArm stands.
+/// An arm on a track: a rail of 1.6 m, on which an xArm is mounted.
 fn on_track() -> Bench {
     let folder = tempfile::tempdir().expect("a folder");
     let arm = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/arms/xarm6.urdf");
@@ -160,7 +160,7 @@ fn a_panda_that_moves_is_stopped_by_another_client() {
     assert!((here[0] - goal[0]).abs() > 0.1, "{here:?}");
 }
 
-/// Along with a goal that goes round and turns, at 50 mm/s.
+/// Follows a goal that moves in a circle and rotates, at 50 mm/s.
 fn follow(bench: &mut Bench, limits: &FollowLimits) -> f64 {
     let (kinematics, start) = (bench.kinematics(), bench.tip());
     let begin_s = bench.arm.sim().get_simulation_time().expect("a call");
@@ -179,8 +179,8 @@ fn follow(bench: &mut Bench, limits: &FollowLimits) -> f64 {
     let mut worst_m = 0.0_f64;
     let end = bench.arm.follow(&kinematics, limits, &mut |moment| {
         let now_s = moment.sim_time_s;
-        // In the first second it catches up with a goal that did not wait, and after the last it brakes; the moment is one
-        // pass ahead of the joints.
+        // In the first second it catches up with a goal that did not wait, and after the last one it brakes; the moment is
+        // one pass ahead of the joints.
         if (1.0..8.0).contains(&(now_s - begin_s)) {
             let here = at(now_s - time_step_s).base_from_tip;
             worst_m = worst_m.max(moment.base_from_tip.distance_to(&here).0);
@@ -231,12 +231,12 @@ fn an_arm_on_a_track_is_moved_jogged_and_follows_with_its_track_in_metres() {
 
     bench.move_joints(&start);
     jog_there_and_back(&mut bench, Vector3::y(), 0.3);
-    // Out of the workspace of one that stands at the origin nothing would follow it.
+    // One at the origin would have the goal out of reach.
     let worst_m = follow(&mut bench, &FollowLimits::default());
     assert!(worst_m < 1e-3, "{worst_m} m");
 }
 
-/// The arm alone reaches 0.7 m to the side, and the track carries it further.
+/// The arm alone reaches 0.7 m to the side, and the track extends that.
 #[test]
 fn a_tip_that_goes_further_than_the_arm_reaches_takes_the_track_along() {
     let mut bench = on_track();

@@ -18,7 +18,7 @@ use std::f64::consts::TAU;
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
-/// Only a failure takes so long.
+/// Only a failure takes this long.
 const PATIENCE: Duration = Duration::from_mins(1);
 
 const TIME_STEP_S: f64 = 0.05;
@@ -77,7 +77,7 @@ fn slow() -> MotionLimits {
     MotionLimits::uniform(6, 0.2, 1.0, 10.0)
 }
 
-/// Has a server forget a client, as it does by itself with one that was silent for too long.
+/// Makes a server drop a client, as it does by itself with one that was silent for too long.
 fn forget(address: &str, uuid: &str) {
     let request =
         wire::map([("func", Value::from("_*end*_")), ("args", Value::Array(Vec::new())), ("uuid", Value::from(uuid))]);
@@ -242,11 +242,12 @@ fn a_joint_whose_controller_is_slower_than_the_motion_is_waited_for_and_not_take
     let start = bench.joints();
     let mut goal = start;
     goal[5] += 4.0;
-    // The controller goes no faster than 90°/s.
+    // The controller moves no faster than 90°/s.
     let fast = MotionLimits::uniform(6, 4.0, 30.0, 300.0);
     bench.arm.move_to_joints(&goal, &fast, &CancelToken::default()).expect("it is on its way, and arrives");
 
-    // One that is taken away from where it was sent is in another's hands, though its controller takes it back.
+    // An arm that is moved away from its commanded position is controlled by another client, though its controller
+    // takes it back.
     let mut other = connect(&bench.server);
     let joint = other.sim().get_object_index("/UR5/joint", 0).expect("a joint");
     let at = bench.joints()[0];
@@ -322,7 +323,7 @@ fn a_jog_ends_when_the_simulation_does() {
     assert!(matches!(end, Err(LinkError::NotRunning { state: SimulationState::Stopped, .. })), "{end:?}");
 }
 
-/// A transport that has a look after every pass that its client has made, before the client goes on.
+/// A transport that runs a check after every pass that its client has made, before the client continues.
 struct Watched<F> {
     transport: ZmqTransport,
     is_step: bool,
@@ -361,7 +362,7 @@ impl<F: FnMut() + Send> Transport for Watched<F> {
     }
 }
 
-/// A client that has a look after every pass that it has made.
+/// A client that runs a check after every pass that it has made.
 pub fn watched(server: &CellServer, look: impl FnMut() + Send + 'static) -> CellClient {
     let (address, options) = (endpoint(server), ConnectionOptions::default());
     let transport = Watched { transport: ZmqTransport::new(&address, options.heartbeat), is_step: false, look };
@@ -394,7 +395,7 @@ fn a_cancelled_motion_is_braked_and_not_cut_off() {
     let seen: Vec<f64> = passes.try_iter().collect();
     let cancelled_at = *seen.iter().find(|angle| **angle > CANCELLED_AT_RAD).expect("it was cancelled");
     assert!(rest < 1.6, "it stopped on its way, at {rest}");
-    // From 0.4 rad/s it takes 0.03 rad to stop; an arm that stops dead takes none.
+    // From 0.4 rad/s it takes 0.03 rad to stop; an arm that stops abruptly takes none.
     assert!(rest - cancelled_at > 0.02, "it stopped dead, within {} rad", rest - cancelled_at);
     for triple in seen.windows(3) {
         let acceleration = (triple[2] - 2.0 * triple[1] + triple[0]) / (TIME_STEP_S * TIME_STEP_S);

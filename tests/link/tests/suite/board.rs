@@ -39,7 +39,8 @@ impl Bench {
         self.camera.grab().expect("a frame")
     }
 
-    /// How far behind the sheet, by moment and truth, the point is that the pixel in the middle of the board sees \[m\].
+    /// How far behind the sheet, by moment and truth, the point is that is seen by the pixel in the middle of the board
+    /// \[m\].
     fn depth_error(&mut self, frame: &Frame) -> f64 {
         let truth = self.camera.ground_truth().expect("published");
         let camera_from_base = (frame.base_from_tip * truth.tip_from_camera).inverse();
@@ -111,7 +112,7 @@ fn a_hidden_board_is_not_in_the_depth_and_shows_again() {
     bench.step(1);
     let hidden = bench.grab();
     assert_eq!(hidden.base_from_target_true, seen.base_from_target_true);
-    // What holds the sheet is half a millimetre behind it.
+    // The support of the sheet is half a millimetre behind it.
     let error_m = bench.depth_error(&hidden);
     assert!((error_m - 5e-4).abs() < 1e-5, "{error_m} m");
     assert_ne!(hidden.rgb, seen.rgb);

@@ -10,7 +10,7 @@ use ciborium::Value;
 use handeye_coppeliasim::{CallOptions, CancelToken, Connection, ConnectionOptions, Endpoint, LinkError};
 use handeye_wire::{self as wire, MAX_MESSAGE_BYTES, Reader as _};
 
-/// Longest wait of a test for something that takes milliseconds; only a failure takes so long.
+/// Longest wait of a test for something that takes milliseconds; only a failure takes this long.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 fn options() -> ConnectionOptions {
@@ -34,7 +34,7 @@ fn func(request: &Value) -> &str {
     request.get("func").and_then(|f| f.text()).expect("every request has a function")
 }
 
-/// One ROUTER socket, so that a server can answer late, or not, or go away.
+/// One ROUTER socket, so that a server can answer late, or not, or disappear.
 struct Peer {
     socket: zmq::Socket,
     port: u16,
@@ -74,7 +74,7 @@ impl Peer {
     }
 }
 
-/// Runs a server on a thread; joining it passes its failures on.
+/// Runs a server on a thread; joining it propagates its failures.
 fn serve(server: impl FnOnce(Peer) + Send + 'static) -> (Endpoint, JoinHandle<()>) {
     let peer = Peer::bind(None);
     let endpoint = Endpoint::local(peer.port);
@@ -130,7 +130,7 @@ fn nobody_at_the_address_is_told_from_a_silent_server() {
     let endpoint = Endpoint::local(free);
     let limit = Duration::from_millis(200);
     let mut connection = connect(&endpoint, ConnectionOptions { reply_timeout: limit, ..options() });
-    // However long the call may take: there is nobody to take it.
+    // However long the call may take: no server is there to receive it.
     let limits = CallOptions::long(PATIENCE, &CancelToken::default());
     let error = connection.call_with("sim.moveToConfig", vec![], &limits).expect_err("nobody");
     assert!(matches!(&error, LinkError::Unreachable { .. }), "{error}");
@@ -256,7 +256,7 @@ fn a_connection_that_ends_between_two_calls_is_known_to_have_lost_what_the_serve
 #[test]
 fn a_server_that_died_is_reported_by_every_call_at_once_until_it_is_back() {
     let (endpoint, mut connection) = connection_to_the_dead();
-    // Not after the time allowed for a reply: whoever holds the arm has to know at once.
+    // Not after the reply timeout: the controller of the arm has to know at once.
     for _ in 0..3 {
         let error = connection.call("sim.x", vec![]).expect_err("the server has gone");
         assert_eq!(error, LinkError::Disconnected { call: "sim.x".to_owned() });
@@ -269,7 +269,7 @@ fn a_server_that_died_is_reported_by_every_call_at_once_until_it_is_back() {
     assert_eq!(reply.integer(0), Ok(2));
 }
 
-/// A plain TCP peer that completes ZeroMQ's handshake by hand and does then what a library would not.
+/// A plain TCP peer that completes ZeroMQ's handshake by hand and then does what a library would not.
 fn by_hand(then: impl FnOnce(TcpStream) + Send + 'static) -> (Endpoint, JoinHandle<()>) {
     let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
     let endpoint = Endpoint::local(listener.local_addr().expect("bound").port());
@@ -292,7 +292,7 @@ fn by_hand(then: impl FnOnce(TcpStream) + Send + 'static) -> (Endpoint, JoinHand
 #[test]
 fn a_host_that_vanishes_without_a_word_is_noticed_within_two_seconds() {
     let (finished, is_finished) = pair();
-    // The frozen host does not even answer heartbeats: its connection stays open until the client has given up.
+    // The frozen host does not even answer heartbeats: its connection stays open until the client gives up.
     let (endpoint, server) = by_hand(move |_stream| done(&is_finished));
     let mut connection = connect(&endpoint, options());
     let started = Instant::now();
@@ -333,7 +333,7 @@ fn cancelling_ends_a_long_silent_call_and_tells_the_server() {
     let (endpoint, server) = serve(move |peer| {
         let (_, request) = peer.next();
         pending.send(()).expect("the test listens");
-        // The server hears that the client has given the motion up, although it never answered.
+        // The server is notified that the client has cancelled the motion, although it never answered.
         let (_, farewell) = peer.next();
         assert_eq!(func(&farewell), "_*end*_");
         assert_eq!(farewell.get("uuid"), request.get("uuid"));
@@ -351,7 +351,7 @@ fn cancelling_ends_a_long_silent_call_and_tells_the_server() {
     cancel.cancel();
     let (error, ended) = client.join().expect("no panic");
     assert_eq!(error, LinkError::Cancelled { call: "sim.moveToConfig".to_owned() });
-    // 50 ms are promised; the rest is for a machine that has other things to do.
+    // 50 ms are promised; the rest is for a busy machine.
     assert!(ended.saturating_duration_since(cancelled) < Duration::from_millis(500), "{:?}", ended - cancelled);
     join(server);
 }
@@ -365,7 +365,7 @@ fn a_client_that_gives_up_again_and_again_is_heard_every_time() {
     let (endpoint, server) = serve(move |peer| {
         let uuid = |request: &Value| request.get("uuid").and_then(|id| id.text()).expect("an id").to_owned();
         let (mut calls, mut farewells) = (Vec::new(), Vec::new());
-        // A farewell goes its own way and may come after the next call.
+        // A farewell takes its own path and may arrive after the next call.
         while farewells.len() < ROUNDS {
             let (to, request) = peer.next();
             if func(&request) == "_*end*_" {
@@ -375,7 +375,7 @@ fn a_client_that_gives_up_again_and_again_is_heard_every_time() {
             let token = for_server[calls.len()].clone();
             calls.push(uuid(&request));
             if calls.len() % 2 == 0 {
-                // Give up in the middle of a conversation, while the answer is the client's to give.
+                // Cancel in the middle of a conversation, while it is the client's turn to answer.
                 token.cancel();
                 peer.say(&to, &ask("_*wait*_"));
             } else {
@@ -515,7 +515,7 @@ fn leaving_a_server_that_has_gone_does_not_take_long() {
     let (endpoint, server) = serve(|peer| {
         let (to, _) = peer.next();
         peer.say(&to, &ret(vec![]));
-        // The reply has to be out before the socket closes, and the farewell of nobody is in the way.
+        // The reply has to be sent before the socket closes, and no farewell is in the way.
         let _farewell = peer.next();
     });
     let mut connection = connect(&endpoint, options());

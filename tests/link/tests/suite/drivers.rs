@@ -1,4 +1,4 @@
-//! Drivers as programs of their own: the template, ones with something wrong, and ones that die.
+//! Drivers as programs of their own: the template, faulty ones, and ones that die.
 
 use std::io::BufReader;
 use std::net::{Shutdown, TcpListener};
@@ -18,7 +18,7 @@ use handeye_driver::{
 use handeye_geometry::testing::python;
 use handeye_server::{CellConfig, CellServer};
 
-/// Longest wait for what comes within a second on a machine that has nothing else to do.
+/// Longest wait for what takes a second on an idle machine.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 fn file(path: &str) -> PathBuf {
@@ -31,7 +31,7 @@ fn command(python: &Path, script: &str, arguments: &[&str]) -> DriverSpec {
     DriverSpec::Command(words)
 }
 
-/// As the workbench waits, but for a machine that is busy.
+/// As the workbench waits, but for a busy machine.
 fn options() -> DriverOptions {
     DriverOptions { hello: PATIENCE, ..DriverOptions::default() }
 }
@@ -108,7 +108,7 @@ fn a_motion_is_stopped_on_its_way_by_whoever_asks_for_it() {
         }
     };
     for by_another_thread in [false, true] {
-        // What it reported last may be of the motion before.
+        // What it reported last may belong to the motion before.
         is_seen(false);
         let cancel = CancelToken::default();
         let moving = std::thread::spawn({
@@ -138,7 +138,7 @@ fn a_driver_that_dies_says_why_and_another_takes_its_place() {
 
     drop(again);
 
-    // As the window does: each thread asks the host, and the first one that finds the driver gone starts another.
+    // As in the window: each thread asks the host, and the first one that finds the driver gone starts another.
     let spec = DriverCellSpec { robot: broken(&python, "none"), camera: None };
     let host = DriverHost::new(spec, options());
     let cancel = CancelToken::default();
@@ -190,7 +190,7 @@ fn what_a_driver_has_started_ends_with_it_also_when_it_has_left_the_group() {
         if is_killed {
             kill(driver.hello().name.rsplit(' ').next().unwrap());
             assert!(matches!(ending(&driver), Ending::Exited { .. }));
-            // It does not know where it is from, and its parent was gone before anybody looked.
+            // Its parent process was gone before anybody looked.
             ids.pop().into_iter().for_each(kill);
         }
         drop(driver);
@@ -271,7 +271,8 @@ fn images_of_one_driver_get_the_pose_of_another_whose_clock_is_elsewhere() {
     assert!(off_s <= clocks.uncertainty_s, "off by {off_s} s, stated {} s", clocks.uncertainty_s);
 
     let height_m = |time_s: f64| 0.5 + 0.2 * (std::f64::consts::PI * time_s).sin();
-    // The fastest that the tip goes, and what a straight line between states up to 0.25 s apart leaves of the curve.
+    // The fastest speed of the tip, and the deviation of the curve from a straight line between states up to 0.25 s
+    // apart.
     let (fastest_m_s, curve_m_s2) = (0.2 * std::f64::consts::PI, 0.2 * std::f64::consts::PI.powi(2));
     let (mut after, mut compared, mut worst_m) = (None, 0, 0.0_f64);
     while compared < 40 {
@@ -291,7 +292,7 @@ fn images_of_one_driver_get_the_pose_of_another_whose_clock_is_elsewhere() {
     assert!(worst_m < 0.02, "{worst_m}");
 }
 
-/// A fake driver that listens, for so many workbenches one after the other; and where.
+/// A fake driver that listens, for this many workbenches one after the other; and its address.
 fn listening_fake(options: FakeOptions, workbenches: usize) -> (DriverSpec, JoinHandle<()>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let spec = DriverSpec::Tcp(listener.local_addr().unwrap().to_string());
@@ -331,7 +332,7 @@ fn a_fake_cell_over_tcp_sees_its_board_and_goes_where_it_is_told_with_robot_and_
         after = Some(frame.stamp_s);
         assert_eq!((frame.rgb.width(), frame.depth.as_ref().map(|depth| depth.width)), (640, Some(640)));
         assert!(frame.intrinsics.is_some_and(|lens| lens.validate().is_ok()));
-        // Until the images are of the arm where it stands now.
+        // Until the images are from the present position of the arm.
         match frame.robot {
             Ok(robot) if robot.moving == Some(false) && robot.speed_m_s < 1e-9 => break robot,
             _ => {}
@@ -349,7 +350,7 @@ fn a_fake_cell_over_tcp_sees_its_board_and_goes_where_it_is_told_with_robot_and_
     camera_thread.join().unwrap();
 }
 
-/// A fault of `broken.py`, and what a report says of it.
+/// A fault of `broken.py`, and what a report contains about it.
 const FAULTS: &[(&str, &str)] = &[
     ("early exit", "ended (exit status: 1): ModuleNotFoundError"),
     ("silent", "has not answered `hello` within"),

@@ -1,6 +1,6 @@
 //! All integration tests of the client and the cell in one program, which is linked once.
 //!
-//! `slow` is what the fast tier (`./test fast`) leaves out.
+//! `slow` is what the fast tier (`./test fast`) skips.
 
 mod any_joints;
 mod arm;

@@ -1,4 +1,4 @@
-//! Arms that are no UR5: their chain is read from the running simulation and used to move the tip.
+//! Arms other than the UR5: their chain is read from the running simulation and used to move the tip.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_server::{CellConfig, CellServer};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-/// Of a chain that was read as `f64`; searched joint values agree with a pose to 1e-8.
+/// Accuracy of a chain that was read as `f64`; searched joint values agree with a pose to 1e-8.
 const READ_M: f64 = 1e-9;
 const SEARCHED_M: f64 = 1e-7;
 
@@ -58,7 +58,7 @@ impl Bench {
         self.arm.move_to_joints(goal, &limits, &CancelToken::default()).expect("there");
     }
 
-    /// Where the tip is stated to be is where it is, after another motion of all joints than the one it was read at.
+    /// The tip is where it is stated to be, also after a motion of all joints away from where the chain was read.
     pub fn assert_known(&mut self, kinematics: &ArmKinematics) {
         let now = self.arm.joint_values().expect("a call");
         let sign = |i: usize| if i.is_multiple_of(2) { 1.0 } else { -1.0 };
@@ -124,7 +124,7 @@ fn the_tip_of_an_xarm_is_jogged_along_and_about_axes_and_stops_where_it_can_go_n
     let up = ArmJog::Line { kinematics: &kinematics, axes: JogAxes::Base, along: Vector3::z() };
     let end = bench.arm.jog(&up, None, &mut || Some(1.0)).expect("calls");
     assert!(matches!(end, JogEnd::Obstacle(_)), "{end:?}");
-    // It is the end indeed: a little higher there is no way to stand, from wherever it is looked for.
+    // It is indeed the limit: a little higher there is no solution, from wherever the search starts.
     let here = bench.tip();
     assert!(here.translation().z > after.translation().z + 0.05, "{here:?}");
     let arm_from_tip = bench.truth.world_from_arm.inverse() * Translation3::new(0.0, 0.0, 0.05) * here.isometry();
@@ -148,7 +148,7 @@ fn a_typed_goal_of_an_xarm_is_checked_and_reached_along_a_line() {
     let found = kinematics.reach(&goal, &joints).expect("it is in reach");
     assert_eq!(bench.truth.arm.first_violation(&found), None);
     let limits = MotionLimits::uniform(4, 0.5, 2.0, 20.0);
-    // Tighter than any inverse kinematics of a server is asked for.
+    // Tighter than any server's inverse kinematics.
     let tolerance = MotionTolerance { distance_m: SEARCHED_M, angle_rad: 1e-6 };
     bench.arm.sim().set_stepping(false).expect("a call");
     bench.arm.move_to_pose(&goal, &limits, &tolerance, &CancelToken::default()).expect("there");
@@ -202,7 +202,7 @@ fn the_camera_of_an_arm_with_seven_joints_is_seen() {
     assert!(bright > 2.0 * dark + 100.0, "the board's squares: {dark} to {bright}");
 }
 
-/// Anybody's scene: the arm has a name of its own, and one sensor takes colour and depth.
+/// A foreign scene: the arm has a name of its own, and one sensor provides colour and depth.
 #[test]
 fn an_arm_of_another_name_is_found_by_its_object_paths_and_without_them_the_scene_says_what_it_has() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/scenes/panda.toml");
@@ -231,13 +231,13 @@ fn an_arm_of_another_name_is_found_by_its_object_paths_and_without_them_the_scen
     assert_eq!(here.info().joints.len(), 7);
 }
 
-/// The joints that carry the tip that was named are driven, not those of the arm that has the usual names.
+/// The joints that carry the named tip are driven, not those of the arm with the usual names.
 #[test]
 fn of_two_arms_the_one_with_the_named_tip_is_driven_and_a_named_base_that_is_not_there_is_an_error() {
     let mut bench = Bench::start(Scene::reference().expect("valid"));
     let start = bench.arm.joint_values().expect("a call");
     let sim = bench.arm.sim();
-    // The wrist stands by itself: three joints of the usual names are left on /UR5.
+    // The wrist is separate: three joints of the usual names are left on /UR5.
     let fourth = sim.get_object_index("/UR5/joint", 3).expect("a joint");
     let args = vec![fourth.0.into(), (-1).into(), true.into()];
     sim.connection().call("sim.setObjectParent", args).expect("a call");

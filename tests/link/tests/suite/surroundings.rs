@@ -1,4 +1,4 @@
-//! What stands around, read from a running cell, and motions that end before it.
+//! The obstacles, read from a running cell, and motions that end before them.
 
 use handeye_cell::scene::Scene;
 use handeye_coppeliasim::cell::{ArmJog, Contact, JogAxes, JogEnd, JogObstacle, MotionTolerance};
@@ -30,7 +30,7 @@ fn the_shapes_of_the_scene_stand_around_but_not_the_arm_and_not_the_board() {
     on_board.sort();
     assert_eq!(on_board, ["Panel", "Stand"]);
     assert_eq!(obstacles_found.all().obstacles.len(), around.len() + 2);
-    // As the scene has it.
+    // As in the scene.
     let table = obstacles_found.around.obstacles.iter().find(|it| it.name == "Table").expect("it was found");
     let truth = bench.truth.solids.iter().find(|it| it.name == "table").expect("it is there");
     for axis in 0..3 {
@@ -49,11 +49,11 @@ fn a_box_that_the_foot_of_the_arm_stands_in_is_hollow_and_one_out_of_reach_does_
     let kinematics = bench.kinematics();
     let obstacles_found = bench.arm.surroundings(&kinematics).expect("calls");
     let names: Vec<&str> = obstacles_found.around.obstacles.iter().map(|it| it.name.as_str()).collect();
-    // What the arm stands on may be within the cage.
+    // What the arm is mounted on may be within the cage.
     assert_eq!(names, ["plane under the arm", "Near"]);
 }
 
-/// A plate beside the tip, where a jog along x of the base leads.
+/// A plate next to the tip, where a jog along x of the base leads.
 fn plate(bench: &mut Bench, beside_m: f64) -> Surroundings {
     let at = bench.tip().translation() + Vector3::new(beside_m, 0.0, 0.0);
     Surroundings::of(vec![Obstacle::new("plate", Isometry3::from(at), [0.02, 0.12, 0.12])])
@@ -70,7 +70,7 @@ fn a_jog_ends_before_a_box_names_it_and_gets_away_again() {
     assert!(among.guard(&start).contact(&start).is_none());
     let line = |along| ArmJog::Line { kinematics: &kinematics, axes: JogAxes::Base, along };
     let named = JogEnd::Obstacle(JogObstacle::Contact(Contact::Box { name: "plate".to_owned() }));
-    // By a step that is too long nothing moves.
+    // With too long a step nothing moves.
     let refused = bench.arm.jog(&line(Vector3::x()), Some(0.3), &mut || Some(1.0)).expect("calls");
     assert_eq!(refused, named);
     assert_eq!(bench.arm.joint_values().expect("a call"), start);
@@ -81,7 +81,7 @@ fn a_jog_ends_before_a_box_names_it_and_gets_away_again() {
     assert!(among.arm.is_free(&here, &around, among.clearance_m - 1e-6), "it came too near");
     assert!(!among.arm.is_free(&here, &around, among.clearance_m + 0.02), "it ended long before");
     assert!(bench.tip().distance_to(&before).0 > 0.01, "it moved");
-    // Held with the arm too near, as by something that was put there: away it goes, and no nearer.
+    // Held with the arm too close, as if something had been placed there: it may move away, but no nearer.
     let mut nearer = around;
     nearer.obstacles[0].size_m[0] += 0.01;
     bench.arm.keep_clear(Some(kinematics.among(nearer, None)));
@@ -121,7 +121,7 @@ fn a_goal_behind_a_box_is_refused_before_anything_moves_and_limits_of_speed_are_
     assert!(took_s >= least_s, "{took_s} s for a way of at least {least_s} s");
 }
 
-/// Out of reach the tip leaves its line and ends as near as it gets: what stands there is in the way as well.
+/// Out of reach the tip leaves its line and ends as near as it can: an obstacle there is in the way as well.
 #[test]
 fn a_line_that_leads_out_of_reach_is_gone_through_to_its_end_before_anything_moves() {
     let mut bench = realistic();

@@ -1,9 +1,9 @@
-//! The vendor's own servers, replayed: what they answered to this very client, byte by byte.
+//! The vendor's own servers, replayed: their answers to this very client, byte by byte.
 //!
-//! `tests/data/coppeliasim-VERSION.txt` is a conversation with the remote API server of that version in front of the
-//! built-in cell: a line for each message with `R`eceived or `S`ent by the server, and the bytes. It is made again by
-//! running the ignored test with `HANDEYE_VENDOR_SERVER` naming a server whose simulation runs, and `HANDEYE_VENDOR_VERSION` its
-//! version. The client's ids come from a seed, so it sends the same requests in the replay, or the test fails.
+//! `tests/data/coppeliasim-VERSION.txt` is a conversation with the remote API server of that version connected to the built-in
+//! cell: a line for each message with `R`eceived or `S`ent by the server, and the bytes. It is recorded again by running the
+//! ignored test with `HANDEYE_VENDOR_SERVER` naming a server whose simulation runs, and `HANDEYE_VENDOR_VERSION` its version.
+//! The client's ids come from a seed, so it sends the same requests in the replay, or the test fails.
 
 use std::collections::VecDeque;
 use std::fmt::Write as _;
@@ -21,7 +21,7 @@ const VERSIONS: [&str; 3] = ["4.7", "4.10", "newest"];
 
 /// Plays the server's part of a conversation.
 struct Replay {
-    /// What the server received, and what it said to that.
+    /// What the server received, and its answer.
     turns: VecDeque<(Vec<u8>, Vec<u8>)>,
     reply: Option<Vec<u8>>,
 }
@@ -78,7 +78,7 @@ fn recorded(version: &str) -> VecDeque<(Vec<u8>, Vec<u8>)> {
 fn converse(transport: Box<dyn Transport>, endpoint: &Endpoint) -> Result<(), LinkError> {
     let options = |seed| ConnectionOptions { seed: Some(seed), ..ConnectionOptions::default() };
     let control = Sim::new(Connection::over(transport, endpoint, options(7)));
-    // Images are longer than what a recording keeps.
+    // Images exceed what a recording keeps.
     let unused = Sim::new(Connection::over(Box::new(ZmqTransport::new(endpoint, None)), endpoint, options(8)));
     let mut cell = CellClient::over(control, unused, &CellPaths::default())?;
     cell.arm().kinematics()?.expect("it is the UR5");
@@ -106,7 +106,7 @@ fn a_recorded_server_before_4_7_is_refused() {
     assert_eq!(error.to_string(), "this is CoppeliaSim 4.6.0, and 4.7 or newer is needed: update CoppeliaSim");
 }
 
-/// A transport that writes down what passes.
+/// A transport that records all messages.
 struct Recorder {
     inner: ZmqTransport,
     file: Arc<Mutex<String>>,

@@ -38,7 +38,7 @@ fn a_sequence_goes_on_when_the_cell_has_forgotten_the_sleeper() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("session");
     let scene = Scene::reference().expect("a scene");
-    // The answers to pings are those of the library's thread, which is never busy for so long.
+    // Pings are answered by the library's thread, which is never busy for that long.
     let silence = Duration::from_millis(900);
     let cell = CellServer::start(CellConfig { real_time: Some(false), silence, ..CellConfig::new(scene) });
     let endpoint = cell.as_ref().expect("a cell").endpoint();
@@ -53,7 +53,7 @@ fn a_sequence_goes_on_when_the_cell_has_forgotten_the_sleeper() {
         assert!(Instant::now() < deadline, "the arm does not move");
     }
     put_to_sleep(&child);
-    // Time stands still while it is waited for, until the server takes it for gone and lets time pass again.
+    // Time is paused while the client is waited for, until the server drops it and lets time pass again.
     let stood_s = witness.sim().get_simulation_time().expect("an answer");
     while witness.sim().get_simulation_time().expect("an answer") < stood_s + 1.0 {
         assert!(Instant::now() < deadline, "the sleeper is waited for without end");
@@ -72,7 +72,7 @@ fn a_sequence_goes_on_when_the_cell_in_the_same_program_slept_as_well() {
     let (child, mut reported) = auto(&out, &[]);
     until_message(&mut reported, "pose 2 of 10 captured");
     put_to_sleep(&child);
-    // Nothing is to be waited for but time itself.
+    // Only time itself has to pass.
     std::thread::sleep(NAP);
     signal(&child, "CONT");
     check(child, reported, &out);

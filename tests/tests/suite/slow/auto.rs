@@ -1,4 +1,4 @@
-//! The main job from one command, against the truth of the cell.
+//! The main task with one command, compared with the truth of the cell.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -22,7 +22,7 @@ fn auto(folder: &Path, arguments: &[&str]) -> CalibrationResult {
     CalibrationResult::read(&out.join("result.json")).expect("a result")
 }
 
-/// Errors against the truth: mm, degrees, percent.
+/// Errors relative to the truth: mm, degrees, percent.
 fn errors(result: &CalibrationResult) -> (f64, f64, f64) {
     let truth = result.truth.expect("the cell publishes its truth");
     (
@@ -43,7 +43,7 @@ fn a_panda_is_calibrated_within_what_it_states_keeps_seven_joints_and_follows_th
     println!("Panda, planned poses: {mm:.4} mm, {deg:.4}°, focal length {percent:.4} %");
     let covariance = result.hand_eye.as_ref().and_then(|link| link.covariance).expect("stated");
     let sigma = |from: usize| (from..from + 3).map(|i| covariance[i][i]).sum::<f64>().sqrt();
-    // Three standard deviations of each: what is left in an exact cell is rounding to grey levels.
+    // Three standard deviations of each: the remaining error in an exact cell is rounding to grey levels.
     assert!(mm <= 3.0 * sigma(0) * 1e3, "{mm} mm, stated {} mm", sigma(0) * 1e3);
     assert!(deg <= 3.0 * sigma(3).to_degrees(), "{deg}°, stated {}°", sigma(3).to_degrees());
     assert_eq!(result.views.len(), 20);
@@ -85,7 +85,7 @@ fn a_panda_is_calibrated_within_what_it_states_keeps_seven_joints_and_follows_th
     assert!(tracked["summary"]["follow_ended"].is_null(), "{}", tracked["summary"]);
 }
 
-/// A scene of somebody else's: the arm is a Panda and is called so.
+/// A foreign scene: the arm is a Panda with that name.
 #[test]
 fn an_arm_of_another_name_is_calibrated_once_the_objects_of_its_scene_are_named() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -124,7 +124,7 @@ fn an_arm_of_another_name_is_calibrated_once_the_objects_of_its_scene_are_named(
     assert!(mm < 3.0 * stated_mm, "{mm} mm, stated {stated_mm} mm");
 }
 
-/// A cable that a turn of the hand would tear, said by the limits of a URDF file.
+/// A cable that a rotation of the hand would tear, modelled by the limits of a URDF file.
 #[test]
 fn poses_are_chosen_by_the_chain_that_was_named_with_its_ranges() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -147,7 +147,7 @@ fn poses_are_chosen_by_the_chain_that_was_named_with_its_ranges() {
     assert!(kept.len() > 3 && kept.iter().all(is_within), "{kept:?}");
 }
 
-/// Over a connection nobody has given a scene: the views are of the board of the cell that is there, by its arm.
+/// Over a connection no scene is given: the views are of the board of the connected cell, with its arm.
 #[test]
 fn views_are_planned_for_the_arm_and_the_board_of_a_cell_that_is_connected_to() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -171,12 +171,12 @@ fn the_ten_reference_poses_calibrate_the_exact_cell() {
     let result = auto(folder.path(), &["--poses", "seed10", "--json", json.to_str().expect("UTF-8")]);
     let (mm, deg, percent) = errors(&result);
     println!("reference scene, ten poses: {mm:.3} mm, {deg:.4}°, focal length {percent:.4} %");
-    // The cell is exact and its images have no noise: what is left is rounding to grey levels.
+    // The cell is exact and its images have no noise: the remaining error is rounding to grey levels.
     assert!(mm <= 0.03 && deg <= 0.03 && percent <= 0.2, "{mm} mm {deg}° {percent} %");
     assert_eq!(result.views.len(), 10);
     assert_eq!(CalibrationResult::read(&json).expect("the copy"), result);
 
-    // What it says of itself has to hold too: the bound for these poses at its own corner noise.
+    // Its own statement has to hold too: the bound for these poses at its own corner noise.
     let stated = result.quality.tip_error_95_mm.expect("stated");
     assert!(stated < 0.5, "{stated}");
 
@@ -224,7 +224,7 @@ fn a_realistic_cell_is_calibrated_with_every_seed() {
             "realistic scene, seed {seed}: {mm:.3} mm, {deg:.4}°, {percent:.4} %; robot {robot_mm:.3} mm {robot_deg:.4}°"
         );
         assert!(mm <= 1.0 && deg <= 0.05, "seed {seed}: {mm} mm {deg}°");
-        // The scene's robot repeats to 0.05 mm and 0.01° per axis; twenty poses tell that to a fifth or so.
+        // The scene's robot repeats to 0.05 mm and 0.01° per axis; twenty poses determine that to about a fifth.
         assert!((0.02..0.1).contains(&robot_mm) && (0.005..0.02).contains(&robot_deg), "{robot_mm} {robot_deg}");
     }
 }

@@ -1,4 +1,4 @@
-//! The command line on a cell that has nothing but what CoppeliaSim has: image and pose of one instant are had as there,
+//! The command line on a cell that has only what CoppeliaSim has: image and pose of one instant are obtained as there,
 //! by having the sensors take their images while the simulation is held.
 
 use std::path::Path;
@@ -35,7 +35,7 @@ fn first_pose() -> Pose<Base, Tip> {
     *first
 }
 
-/// Swings the arm about the joint at its base until it is told that it is enough; returns how far the tip went \[m\].
+/// Swings the arm about its base joint until cancelled; returns how far the tip moved \[m\].
 fn to_and_fro(arm: &mut Arm, enough: &CancelToken) -> Result<f64, LinkError> {
     let centre = arm.joint_values()?;
     let tip = arm.base_from_tip()?.translation();
@@ -61,7 +61,7 @@ fn ten_poses_calibrate_it_and_a_moving_arm_sees_the_board_where_it_is() {
     let folder = tempfile::tempdir().expect("a folder");
     let result = calibrated(folder.path(), &endpoint);
     let truth = result.truth.expect("CoppeliaSim tells where its camera is");
-    // As exact as on the cell that says which pass its images show.
+    // As exact as on the cell that reports which pass its images show.
     let (mm, deg) = (truth.translation_error_mm.expect("known"), truth.rotation_error_deg.expect("known"));
     println!("ten poses: {mm:.3} mm, {deg:.4}°");
     assert!(mm <= 0.03 && deg <= 0.03, "{mm} mm {deg}°");
@@ -105,7 +105,7 @@ fn ten_poses_calibrate_it_and_a_moving_arm_sees_the_board_where_it_is() {
     let rms_mm = 1e3 * (errors_m.iter().map(|m| m * m).sum::<f64>() / errors_m.len() as f64).sqrt();
     println!("{} images, {travelled_m:.2} m travelled: board off by {rms_mm:.3} mm RMS", errors_m.len());
     assert!(errors_m.len() >= 110 && travelled_m >= 0.05, "{} images, {travelled_m} m", errors_m.len());
-    // A joint of this pass beside an image of the last one is 5 mm at this speed.
+    // A joint of this pass with an image of the last one would be 5 mm at this speed.
     assert!(rms_mm <= 1.0, "{rms_mm} mm");
 }
 

@@ -29,7 +29,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("a number: {value}"))
 }
 
-/// An arm that sees nothing and a board that is not as drawn, from first to last.
+/// An arm that does not see the board and a board that is not as drawn, from start to finish.
 #[test]
 fn it_is_calibrated_from_an_arm_that_stands_straight_up_and_a_board_at_rest_is_followed_at_rest() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -50,7 +50,7 @@ fn it_is_calibrated_from_an_arm_that_stands_straight_up_and_a_board_at_rest_is_f
     let print_mm = number(&result["estimate"]["print"]["rms_mm"]);
     println!("{views} views, {error_mm:.3} mm, stated {stated_mm:.3} mm, print {print_mm:.4} mm");
     assert!(views <= 16 && stated_mm <= 0.3 && error_mm <= 2.0 * stated_mm);
-    // Its pixels are 0.195 mm, so that lines are off by a twelfth of the square of that.
+    // Its pixels are 0.195 mm, so the variance of line errors is a twelfth of the square of that.
     assert!((0.04..0.07).contains(&print_mm));
     let codes: Vec<&str> = result["findings"]
         .as_array()
@@ -59,7 +59,7 @@ fn it_is_calibrated_from_an_arm_that_stands_straight_up_and_a_board_at_rest_is_f
         .filter_map(|finding| finding["code"].as_str())
         .collect();
     assert!(codes.contains(&"print_errors") && !codes.contains(&"board_bent"), "{codes:?}");
-    // The renderer adds a part of what the depth changes by from pixel to pixel, and nothing else.
+    // The renderer adds a fraction of the depth change from pixel to pixel, and nothing else.
     let depth = &result["depth"]["errors"];
     let (slope_px, sigma_px) = (number(&depth["slope_px"]), number(&depth["slope_sigma_px"]));
     println!("depth of slopes {slope_px:.3} ± {sigma_px:.3} px");
@@ -92,10 +92,10 @@ fn it_is_calibrated_from_an_arm_that_stands_straight_up_and_a_board_at_rest_is_f
     assert!(number(&summary["tracked"]) >= 50.0, "{summary}");
     assert!(number(&summary["position_rms_mm"]) <= 0.2, "{summary}");
     assert!(number(&summary["rotation_rms_deg"]) <= 0.05, "{summary}");
-    // What a pose from corners alone makes of the tip are millimetres.
+    // A pose of the tip from corners alone is off by millimetres.
     assert!(number(&summary["follow_distance_rms_mm"]) <= 0.5, "{summary}");
 
-    // Where the tip has to be is what the truth says of the corner.
+    // The tip has to be where the corner truly is.
     handeye(&["track", "--connect", &endpoint, "--calibration", &out, "--reach", "0", "--stand-off", "20"]);
     let base_from_target = client.arm().ground_truth().expect("the truth").base_from_target.expect("of the board");
     let tip = client.arm().base_from_tip().expect("the tip").translation();

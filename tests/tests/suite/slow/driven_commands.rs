@@ -1,4 +1,4 @@
-//! `auto` and `track` over drivers: programs of their own, two clocks, and a robot that moves only as the command line allows.
+//! `auto` and `track` with drivers: programs of their own, two clocks, and a robot that moves only as the command line allows.
 
 use std::io::Read as _;
 use std::path::Path;
@@ -15,7 +15,7 @@ use handeye_tests::handeye_binary;
 use handeye_tests::process::{end_of, signal, start, until_message};
 use serde_json::Value;
 
-/// A cell that keeps pace with real time, as drivers of hardware do; with another client that looks at it.
+/// A cell that keeps pace with real time, as drivers of hardware do; with another client that observes it.
 struct Cell {
     _server: CellServer,
     endpoint: Endpoint,
@@ -31,7 +31,7 @@ impl Cell {
         Self { _server: server, endpoint, watch }
     }
 
-    /// The command of a driver of one part of it, with its clock so far ahead.
+    /// The command of a driver of one part of it, with its clock ahead by this much.
     fn driver(&self, part: &str, clock_s: f64) -> String {
         let endpoint = &self.endpoint;
         format!("'{}' driver fake --connect {endpoint} --only {part} --clock {clock_s}", handeye_binary().display())
@@ -50,7 +50,7 @@ fn reported(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// How far the answer of a session is from the truth \[mm\], which no driver reports.
+/// The error of the answer of a session \[mm\] relative to the truth, which no driver reports.
 fn error_mm(session: &Path, truth: &Pose<Tip, Camera>) -> f64 {
     let result = CalibrationResult::read(&session.join("result.json")).expect("a result");
     assert!(result.truth.is_none(), "nobody reports it");
@@ -98,7 +98,7 @@ fn a_real_cell_is_calibrated_and_tracked_from_the_command_line_once_it_may_move(
     let mm = error_mm(&session, &truth);
     assert!(mm < 0.5, "{mm} mm: a clock off by 80 ms, or an image of another pose, would show here");
 
-    // The same cell is tracked, and the tip goes to a corner of the board once.
+    // The same cell is tracked, and the tip moves to a corner of the board once.
     let (result, track) = (session.join("result.json"), folder.path().join("track.json"));
     let track_file = track.to_str().expect("UTF-8");
     let tracking = ["track", "--calibration", result.to_str().expect("UTF-8"), "--json", track_file];
@@ -125,7 +125,7 @@ fn a_real_cell_is_calibrated_and_tracked_from_the_command_line_once_it_may_move(
     let board = truth.base_from_target.expect("published");
     let tip = cell.watch.base_from_tip().expect("a call").translation();
     let from_board = board.inverse().isometry() * nalgebra::Point3::from(tip);
-    // Corner 0 is the origin of the board, whose z axis leads away from the camera.
+    // Corner 0 is the origin of the board, whose z axis points away from the camera.
     let off_mm = (from_board.coords - nalgebra::Vector3::new(0.0, 0.0, -0.15)).norm() * 1e3;
     assert!(off_mm < 1.5, "the tip is {off_mm} mm from where it was to be: {from_board}");
 

@@ -1,4 +1,4 @@
-//! `handeye driver`: the fake driver as a program of its own, and the conformance test as an author runs it.
+//! `handeye driver`: the fake driver as a program of its own, and the conformance test as run by an author.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::Path;
@@ -11,8 +11,8 @@ use serde_json::Value;
 
 use crate::solved::{handeye, text};
 
-/// A Python on a `PATH` of its own, which makes environments without a network: they are the Python of the tests. Notes how often
-/// it is asked to install packages, and waits before that until it may, or fails.
+/// A Python on a `PATH` of its own, which creates environments without a network: they are the Python of the tests. Counts how
+/// often it has to install packages, and waits for permission before that, or fails.
 struct Installer {
     home: tempfile::TempDir,
 }
@@ -51,13 +51,14 @@ impl Installer {
 #[test]
 fn the_environment_of_a_driver_is_made_once_and_says_so() {
     let Some(python) = python() else { return };
-    // Longer than a workbench is left without a word: `driver test` is none, and its output is the report.
+    // Longer than a workbench is left without a message: `driver test` is not a workbench, and its output is the
+    // report.
     let installer = Installer::new(&python, "", "echo Collecting pillow; sleep 3");
     let images = tempfile::tempdir().expect("a folder");
     RgbImage::new(8, 6).save(images.path().join("a.png")).expect("an image");
     let driver = format!("handeye driver folder '{}' --images-only", images.path().display());
     for run in 1..=2 {
-        // The driver is started twice in each.
+        // The driver is started twice in each run.
         let output = installer.handeye(&["driver", "test", &driver, "--json", "-"]).output().expect("handeye runs");
         let report: Value = serde_json::from_slice(&output.stdout).expect("nothing but the report");
         let errors = text(&output.stderr);
@@ -67,7 +68,7 @@ fn the_environment_of_a_driver_is_made_once_and_says_so() {
         assert_eq!(says_so, run == 1, "{errors}");
         assert_eq!(report["passed"], true, "{report:#}");
     }
-    // Help makes none.
+    // Help creates no environment.
     let other = Installer::new(&python, "", "");
     let output = other.handeye(&["driver", "ur-rtde", "--help"]).output().expect("handeye runs");
     let help = text(&output.stdout);
@@ -175,7 +176,7 @@ fn the_fake_driver_passes_its_own_test_in_a_process_and_over_tcp() {
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stdout));
 }
 
-/// As the window starts those of its list.
+/// As the window starts those in its list.
 #[test]
 fn the_drivers_that_come_with_the_program_are_started_from_it_where_it_is_not_on_the_path() {
     let output = Command::new(handeye_binary())
@@ -186,7 +187,7 @@ fn the_drivers_that_come_with_the_program_are_started_from_it_where_it_is_not_on
     assert_eq!(output.status.code(), Some(0), "{}{}", text(&output.stdout), text(&output.stderr));
 }
 
-/// As somebody does who wants to see what it says.
+/// As a user would to see its output.
 #[test]
 fn a_driver_that_is_started_in_a_terminal_says_for_what_it_waits() {
     let Some(python) = python() else { return };

@@ -1,6 +1,7 @@
-//! The way of somebody who opens the workbench for the first time, by real mouse and keyboard on a screen of its own.
+//! The workflow of a user who opens the workbench for the first time, with a real mouse and keyboard on a screen of its
+//! own.
 //!
-//! Screenshots go to `$HANDEYE_SCREENSHOTS`, or else beside the build.
+//! Screenshots go to `$HANDEYE_SCREENSHOTS`, or else next to the build.
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -31,7 +32,7 @@ fn a_first_user_gets_from_the_start_to_exported_files_with_few_clicks() {
     desktop.until_seen("Expected error");
     desktop.photograph("3-solved");
 
-    // Somewhere between the poses, for a capture that never enters the fit.
+    // Somewhere between the poses, for a verification capture.
     desktop.click("Jog");
     desktop.click("Step 50 mm");
     let before = desktop.label("Tip in base, x y z [mm]:");
@@ -58,7 +59,7 @@ fn a_first_user_gets_from_the_start_to_exported_files_with_few_clicks() {
         assert!(session.join(file).is_file(), "{file}");
     }
 
-    // The same session again, as a reader of Chinese who likes it light; nothing was reported to be saved.
+    // The same session again, in Chinese and with the light theme; nothing had to be saved.
     let session = session.to_string_lossy().into_owned();
     let copy = tempfile::tempdir().expect("a folder");
     let kept = copy.path().join("标定");
@@ -79,7 +80,7 @@ fn a_first_user_has_the_poses_chosen_and_gets_to_exported_files_with_three_click
     guided("first_user_guided", "reference");
 }
 
-/// Seven joints, and a board that lies flat before the camera.
+/// Seven joints, and a board that lies flat in front of the camera.
 #[test]
 fn a_first_user_of_a_panda_has_the_poses_chosen_and_gets_to_exported_files_with_three_clicks() {
     guided("first_user_panda", "panda");
@@ -94,7 +95,7 @@ fn guided(name: &str, scene: &str) {
         |folder| PathBuf::from(folder).join(name),
     );
     let folder = tempfile::tempdir().expect("a folder");
-    // What takes two minutes as it is shipped takes many where nothing is optimised.
+    // What takes two minutes in a release build takes many without optimization.
     let hurries = cfg!(debug_assertions);
     let scene = if hurries { hurried(scene, folder.path()).display().to_string() } else { scene.to_owned() };
     let mut desktop = Desktop::start((1440, 900), &shots, &["--scene", &scene], &[]);

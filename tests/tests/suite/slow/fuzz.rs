@@ -1,4 +1,4 @@
-//! Random and mutated messages: the decoders do not panic, and the server still serves.
+//! Random and mutated messages: the decoders do not panic, and the server still works.
 //!
 //! `HANDEYE_FUZZ` sets the number of messages, a million if not given.
 
@@ -16,7 +16,7 @@ fn count() -> usize {
     std::env::var("HANDEYE_FUZZ").ok().and_then(|n| n.parse().ok()).unwrap_or(1_000_000)
 }
 
-/// Requests and replies as they are really sent, to be mutated.
+/// Requests and replies as really sent, to be mutated.
 fn seeds() -> Vec<Vec<u8>> {
     let request = |func: &str, args: Vec<Value>| {
         wire::encode(&wire::map([
@@ -46,7 +46,7 @@ fn seeds() -> Vec<Vec<u8>> {
     ]
 }
 
-/// A seed with a few bytes changed, cut, doubled, or nothing but noise.
+/// A seed with a few bytes changed, cut, duplicated, or pure noise.
 fn mutated(seeds: &[Vec<u8>], rng: &mut impl Rng) -> Vec<u8> {
     let mut bytes = seeds[rng.random_range(0..seeds.len())].clone();
     match rng.random_range(0..5) {
@@ -118,7 +118,7 @@ fn the_server_still_serves_after_a_million_bad_messages() {
     assert!(memory_kib < 2 << 20, "{memory_kib} KiB");
 }
 
-/// Resident memory of this process; 0 where the system does not tell.
+/// Resident memory of this process; 0 if the system does not report it.
 fn resident_kib() -> u64 {
     std::fs::read_to_string("/proc/self/status")
         .ok()

@@ -1,4 +1,4 @@
-//! The end of the workbench, asked for by a signal or by closing it, in the middle of its work.
+//! The end of the workbench, by a signal or by closing it, in the middle of its work.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -15,8 +15,8 @@ use handeye_workbench::command::Command;
 use handeye_workbench::model::{CellSource, Model, SolveStatus};
 use handeye_workbench::{export, solve};
 
-/// The workbench gives itself 2 s to end. The rest is what a machine with other work takes to run it at all; one that waits
-/// for an answer, a motion or a file takes longer.
+/// The workbench gives itself 2 s to end. The rest is for a busy machine; a workbench that waits for an answer, a motion or
+/// a file takes longer.
 const LIMIT: Duration = Duration::from_secs(6);
 /// Longer than anything that is waited for takes on a busy machine.
 const PATIENCE: Duration = Duration::from_mins(4);
@@ -74,7 +74,7 @@ fn a_sequence_ended_by(signal: &str) {
     let mut desktop = Desktop::start((1440, 900), &shots, &["--connect", &address], &[]);
     desktop.until_seen("Board in view");
     desktop.click("Run the 10 taught poses");
-    // Behind an address there may be a real arm.
+    // Behind an address the arm may be real.
     desktop.until_seen("Move there");
     desktop.click("Move there");
     desktop.until_seen("Use capture 2");
@@ -85,7 +85,7 @@ fn a_sequence_ended_by(signal: &str) {
     assert!(status.success(), "it ends as closing the window does: {status}");
     assert!(took < LIMIT, "{took:?}");
 
-    // The point that was sent last takes effect in the pass that follows.
+    // The last target that was sent takes effect in the following pass.
     witness.wait_s(0.2);
     let at_rest = witness.joints();
     witness.wait_s(1.0);

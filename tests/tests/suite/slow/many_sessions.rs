@@ -1,6 +1,6 @@
-//! What a program holds after many sessions: threads and memory end with the session that they were for.
+//! What a program holds after many sessions: threads and memory are released with their session.
 //!
-//! Threads are counted of a whole process, so each count has a process of its own, which is this program again.
+//! Threads are counted for a whole process, so each count has a process of its own, which is this program again.
 
 use std::path::Path;
 use std::process::Command;
@@ -14,21 +14,20 @@ use handeye_workbench::{session, shell};
 /// Set for the process in which threads are counted.
 const COUNTED: &str = "HANDEYE_TEST_COUNTED";
 
-/// Until everything that is made once is there.
+/// Until all one-time allocations are done.
 const FIRST: usize = 10;
 
 /// Sessions after those.
 const SESSIONS: usize = 100;
 
-/// Threads that may still be made, however many sessions there are: two for the layout of every step, with which the library
-/// makes it. A recording that is slow leaves steps out, and makes their layouts later.
+/// Threads that may still be started, however many sessions there are: two for the layout of every step, in which the
+/// library creates it. A slow recording skips steps, and creates their layouts later.
 const MADE_ONCE: usize = 2 * Step::ALL.len();
 
-/// What may be made of a session that is over: names, entries of the log, parts of pages that the allocator keeps \[MB\].
+/// What may remain of a session that is over: names, entries of the log, parts of pages that the allocator keeps \[MB\].
 const MOST_MB: f64 = 20.0;
 
-/// What the servers of a viewer keep besides of every session, for viewers that come later, until they have all that they
-/// keep \[MB\].
+/// What the servers of a viewer keep of every session in addition, for viewers that come later, up to their limit \[MB\].
 const KEPT_MB: f64 = 0.4 * SESSIONS as f64;
 
 /// Longer than threads take to end on a busy machine.
@@ -56,7 +55,7 @@ fn alone(test: &str) {
     let run = Command::new(std::env::current_exe().expect("this program"))
         .args(["--exact", test, "--nocapture", "--test-threads", "1"])
         .env(COUNTED, "1")
-        // Nobody's browser is opened.
+        // No browser is opened.
         .env_remove("DISPLAY")
         .env_remove("WAYLAND_DISPLAY")
         .output()
@@ -67,7 +66,7 @@ fn alone(test: &str) {
     assert!(reported.contains("sessions: "), "{reported}");
 }
 
-/// One more session, in which the person goes through all steps.
+/// One more session, in which the user goes through all steps.
 fn go_through(bench: &mut Workbench, folder: &Path) {
     bench.click(session::Command::New(Some(folder.to_path_buf())));
     bench.until("the new session", |model| model.session.folder.as_deref() == Some(folder));
@@ -77,11 +76,11 @@ fn go_through(bench: &mut Workbench, folder: &Path) {
     }
 }
 
-/// Waits until there are no more threads than this; how many there are at last.
+/// Waits until there are no more threads than this; returns how many there are at last.
 fn settled(bench: &mut Workbench, most: usize) -> usize {
     let deadline = Instant::now() + SOON;
     while threads() > most && Instant::now() < deadline {
-        // Time is part of the model: this waits for the next look.
+        // Time is part of the model: this waits for the next update.
         let now_s = bench.model().now_s;
         bench.until("a moment", |model| model.now_s > now_s);
     }

@@ -1,4 +1,4 @@
-//! The official Python client of CoppeliaSim against `handeye cell`, unmodified, with each of the CBOR libraries that it
+//! The official Python client of CoppeliaSim with `handeye cell`, unmodified, with each of the CBOR libraries that it
 //! may find.
 
 use std::process::Command;
@@ -19,8 +19,8 @@ fn run(python: &std::path::Path, script: &str, arguments: &[&str], cbor: &str) -
     text
 }
 
-/// Scenarios that ask for no joint or pixel exactly where it was put: joints that a controller moves lag, and their arm
-/// does not see the board where it starts.
+/// Scenarios that need no joint or pixel exactly where it was set: joints that a controller moves lag, and their arm
+/// does not see the board at its start.
 const WITH_DYNAMIC_JOINTS: [&str; 12] = [
     "test_first_contact",
     "test_paths",
@@ -47,7 +47,7 @@ fn the_official_client_drives_the_cell_with_either_cbor_library() {
         ("cbor2", nothing, nothing),
         ("cbor2", &coppeliasim[..], &WITH_DYNAMIC_JOINTS[..]),
     ];
-    // All at once: each waits for the time of its cell.
+    // All at once: each waits for the simulated time of its cell.
     std::thread::scope(|scope| {
         for (cbor, cell, scenarios) in runs {
             let python = &python;
@@ -84,8 +84,8 @@ fn a_script_with_opencv_and_handeye_find_the_same_calibration() {
         .sum::<f64>()
         .sqrt();
     println!("OpenCV's Tsai and the joint estimate differ by {off:.3} mm; OpenCV's fit has {} px", theirs["rms_px"]);
-    // A closed form on these ten poses is good to about two millimetres at the corner noise of `cornerSubPix`: that is
-    // what the script that this replaces was off by.
+    // A closed form on these ten poses is good to about two millimetres at the corner noise of `cornerSubPix`: that was
+    // the error of the script that this replaces.
     assert!(off < 3.0, "{off} mm: {theirs} against {ours_mm:?}");
     assert!((theirs["fx"].as_f64().expect("a number") / ours.intrinsics.expect("a camera").fx - 1.0).abs() < 0.01);
 }

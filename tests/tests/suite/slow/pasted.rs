@@ -1,4 +1,5 @@
-//! Commands as they are pasted: those of README.md and of the pages in docs/howto, and the examples in the help of each command.
+//! Commands as users paste them: those of README.md and of the pages in docs/howto, and the examples in the help of each
+//! command.
 
 use std::fs;
 use std::os::unix::fs::{PermissionsExt as _, symlink};
@@ -11,7 +12,7 @@ use tempfile::TempDir;
 
 use crate::solved::{handeye, text};
 
-/// Longest time for all commands of a page or a help together; only a failure takes it.
+/// Longest time for all commands of a page or a help together; only a failure takes this long.
 const PATIENCE_S: &str = "1200";
 
 /// The blocks of a page with how each is marked.
@@ -38,7 +39,7 @@ fn blocks(page: &str) -> Vec<(&str, String)> {
 
 /// Runs commands in a folder, one after the other, until one fails.
 fn run(script: &str, folder: &Path, programs: Option<&Path>) {
-    // What is called `handeye` is the program.
+    // The command `handeye` is the program.
     let bin = folder.join(".bin");
     fs::create_dir(&bin).expect("made");
     symlink(handeye_binary(), bin.join("handeye")).expect("linked");
@@ -56,8 +57,8 @@ fn run(script: &str, folder: &Path, programs: Option<&Path>) {
     assert!(output.status.success(), "{}\n{}\n{}", output.status, text(&output.stdout), text(&output.stderr));
 }
 
-/// Runs the blocks of a page that are marked `sh` in a folder like a clone of the project: what its commands name is there, and
-/// nothing that an earlier run has made. The number of commands, and the folder.
+/// Runs the blocks of a page that are marked `sh` in a folder like a clone of the project: the files that its commands name
+/// exist, and nothing from an earlier run. The number of commands, and the folder.
 fn run_page(page: &Path, python: &Path) -> (usize, TempDir) {
     let text = fs::read_to_string(page).expect("a page");
     let blocks = blocks(&text);
@@ -95,7 +96,7 @@ fn the_commands_of_every_how_to_work_as_they_are_one_after_the_other() {
 fn listed(help: &str) -> Vec<String> {
     let Some((_, rest)) = help.split_once("\nCommands:\n") else { return Vec::new() };
     let lines = rest.lines().take_while(|line| !line.is_empty());
-    // What goes on from the line before is further in.
+    // A continued line has more indentation.
     let named = lines.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
     named.filter_map(|line| line.split_whitespace().next().map(str::to_owned)).filter(|name| name != "help").collect()
 }
@@ -148,7 +149,7 @@ fn no_line_of_a_help_is_wider_than_the_terminal_and_no_example_is_broken() {
 
 #[test]
 fn the_examples_of_every_help_work_as_they_are_one_after_the_other() {
-    // The others are open until Ctrl-C, or speak with another machine.
+    // The others run until Ctrl-C, or connect to another machine.
     let run_here =
         ["auto", "calibrate", "doctor", "export", "import", "plan", "sample", "target", "track", "driver fake"];
     let mut ran = 0;
@@ -158,7 +159,7 @@ fn the_examples_of_every_help_work_as_they_are_one_after_the_other() {
         }
         let (_, examples) = help.split_once("\nExamples").expect("examples");
         let (_, script) = examples.split_once(":\n").expect("a heading");
-        // What comes after an empty line has another heading: it needs more than this.
+        // What comes after an empty line has another heading: it needs further prerequisites.
         let script = script.split("\n\n").next().unwrap_or_default();
         let home = tempfile::tempdir().expect("a folder");
         run(script, home.path(), None);
@@ -167,7 +168,7 @@ fn the_examples_of_every_help_work_as_they_are_one_after_the_other() {
     assert_eq!(ran, run_here.len());
 }
 
-/// Whoever follows a help to the sample a second time loses nothing.
+/// Following a help to the sample a second time loses nothing.
 #[test]
 fn the_sample_is_not_written_over_what_is_there() {
     let home = tempfile::tempdir().expect("a folder");

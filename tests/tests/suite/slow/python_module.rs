@@ -1,4 +1,4 @@
-//! The Python module: its wheel is built as for release but for the optimiser, installed as pip does it, and used.
+//! The Python module: its wheel is built as for a release except for optimization, installed with pip, and used.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -17,8 +17,8 @@ fn module(python: &Path) -> &'static Path {
 fn installed(python: &Path) -> TempDir {
     let wheels = tempfile::tempdir().expect("a folder");
     let site = tempfile::tempdir().expect("a folder");
-    // Beside the running test, so that crates compiled for the other packages serve here. All of them are in Cargo's cache:
-    // the workspace was built with this package.
+    // Next to the running test, so that crates compiled for the other packages are reused. All of them are in Cargo's
+    // cache: the workspace was built with this package.
     let profile = handeye_binary().parent().map(Path::to_path_buf).unwrap_or_default();
     let target = profile.parent().expect("a profile lies in a target folder");
     run(Command::new(python)
@@ -39,7 +39,7 @@ fn installed(python: &Path) -> TempDir {
     site
 }
 
-/// What it printed.
+/// Its output.
 fn run(command: &mut Command) -> String {
     let output = command.output().expect("the program runs");
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
@@ -61,7 +61,7 @@ fn python_gets_what_opencv_the_command_line_and_the_truth_say() {
     let schema = workspace_root().join("assets/schema/handeye-calibration-1.schema.json");
     let Some(text) = script("handeye_module.py", &[&handeye_binary(), &schema, folder.path()]) else { return };
     println!("{text}");
-    // A line for each check.
+    // One line per check.
     assert_eq!(text.lines().count(), 20, "{text}");
 }
 

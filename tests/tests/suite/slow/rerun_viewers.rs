@@ -1,6 +1,6 @@
-//! The recording as people look at it: in a browser, in the native viewer, and in one that hangs.
+//! The recording as seen by users: in a browser, in the native viewer, and in one that hangs.
 //!
-//! Images go to `$HANDEYE_SCREENSHOTS`, or else beside the build.
+//! Images go to `$HANDEYE_SCREENSHOTS`, or else next to the build.
 
 use std::collections::BTreeSet;
 use std::io::{BufRead as _, BufReader};
@@ -31,7 +31,7 @@ fn shots() -> PathBuf {
     folder
 }
 
-/// The native viewer of the Python environment. `None` where there is none, and the test has said that it skips.
+/// The native viewer of the Python environment. `None` if there is none, and the test has reported that it skips.
 fn native_viewer() -> Option<PathBuf> {
     // The program itself: the `rerun` on the path of Python starts it as a child, which signals do not reach.
     let where_it_is = "import rerun_cli, os; print(os.path.join(os.path.dirname(rerun_cli.__file__), 'rerun'))";
@@ -61,12 +61,12 @@ struct Ends(Child);
 
 impl Drop for Ends {
     fn drop(&mut self) {
-        // One that was stopped does not even notice a polite end.
+        // A stopped process does not react to a polite request to end.
         let _ended = self.0.kill().and_then(|()| self.0.wait()).is_ok();
     }
 }
 
-/// Reads lines until one has a web address in it.
+/// Reads lines until one contains a web address.
 fn address(lines: impl std::io::Read) -> String {
     for line in BufReader::new(lines).lines() {
         let line = line.expect("a line");
@@ -77,13 +77,13 @@ fn address(lines: impl std::io::Read) -> String {
     panic!("it ended without an address");
 }
 
-/// Has a browser take an image of a page.
+/// Makes a browser take a screenshot of a page.
 fn photograph(url: &str, image: &Path, profile: &Path) {
     let mut browser = Command::new("chromium")
         .args(["--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"])
         .args(["--enable-unsafe-swiftshader", "--disable-background-networking", "--disable-component-update"])
         .args(["--disable-sync", "--no-first-run", "--force-dark-mode", "--window-size=1400,900"])
-        // No name of any machine is found: there is no network but this machine.
+        // No host name is resolved: there is no network except this machine.
         .arg("--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1")
         .args(["--timeout=60000", "--virtual-time-budget=90000"])
         .arg(format!("--user-data-dir={}", profile.display()))
@@ -112,13 +112,14 @@ fn a_browser_without_network_shows_a_live_session_in_3d() {
     let reported = session.stderr.take().expect("its messages");
     let _session = Ends(session);
     let url = address(reported);
-    // The arm is on its way to its poses meanwhile.
+    // The arm moves to its poses meanwhile.
     let image = shots().join("rerun-web.png");
     let deadline = Instant::now() + PATIENCE;
     loop {
         let _old = std::fs::remove_file(&image).is_ok();
         photograph(&url, &image, &folder.path().join("browser"));
-        // The middle of the window, between the panels: 3D scene and images. A viewer without a recording has but a few.
+        // The centre of the window, between the panels: 3D scene and images. A viewer without a recording has only a
+        // few.
         let seen = colours(&image, [0.2, 0.1, 0.75, 0.7]);
         println!("web viewer: {seen} colours, {}", image.display());
         if seen > 500 {
@@ -135,7 +136,7 @@ fn the_button_opens_the_native_viewer_which_shows_the_cell() {
     if !desktop::is_possible() {
         return;
     }
-    // A viewer that takes an image of itself: what it draws on a screen of memory is not to be had otherwise.
+    // A viewer that takes a screenshot of itself: its image in an off-screen window cannot be obtained otherwise.
     let folder = tempfile::tempdir().expect("a folder");
     let image = shots().join("rerun-native.png");
     let _old = std::fs::remove_file(&image).is_ok();
@@ -164,7 +165,7 @@ fn the_button_opens_the_native_viewer_which_shows_the_cell() {
     assert!(seen > 500, "{seen} colours: see {}", image.display());
 }
 
-/// Images that the workbench shows within a time, and the largest memory \[bytes\] that it had.
+/// Images that the workbench shows within a time, and its largest memory \[bytes\].
 fn at_work(bench: &mut Workbench, seconds: f64) -> (f64, u64) {
     let number = |model: &Model| model.frame.as_ref().map_or(0, |frame| frame.info.number);
     let first = number(bench.model());
@@ -200,7 +201,7 @@ fn a_viewer_that_is_stopped_changes_neither_the_images_nor_the_bound_of_the_memo
     let ViewerState::Web { url } = bench.model().rerun.viewer.clone() else { panic!("no viewer") };
     let decoded = url.replace("%2B", "+").replace("%3A", ":").replace("%2F", "/");
     let sources = decoded.split("&url=").skip(1).map(str::to_owned);
-    // A viewer without a window: it takes what a viewer takes.
+    // A viewer without a window: it reads like any viewer.
     let taken = folder.path().join("taken.rrd");
     let mut reader = Command::new(viewer);
     reader.args(["--bind", "127.0.0.1", "--port", "auto", "--save"]).arg(&taken).args(sources).env("CI", "true");
@@ -218,7 +219,8 @@ fn a_viewer_that_is_stopped_changes_neither_the_images_nor_the_bound_of_the_memo
         before_bytes / 1_000_000,
         stopped_bytes / 1_000_000
     );
-    // 5 % is what the machine itself varies by when other tests run beside this one; a workbench that waits shows none.
+    // 5 % is the variation of the machine itself when other tests run at the same time; a workbench that waits shows
+    // none.
     assert!(stopped_hz > 0.8 * before_hz, "{before_hz} {stopped_hz}");
     assert!(stopped_bytes < before_bytes + MEMORY_BOUND, "{before_bytes} {stopped_bytes}");
 }

@@ -18,7 +18,8 @@ fn command(python: &Path, arguments: &str) -> String {
     format!("'{}' driver {arguments} --python '{}'", handeye_binary().display(), python.display())
 }
 
-/// Runs `handeye driver test`: every check is passed, or skipped for want of motion or of what the driver has not.
+/// Runs `handeye driver test`: every check is passed, or skipped because motion is not allowed or the driver lacks the
+/// feature.
 fn assert_passes(arguments: &str) {
     let Some(python) = python() else { return };
     let output = handeye(&["driver", "test", &command(&python, arguments), "--json", "-"]);

@@ -1,4 +1,4 @@
-//! The recorded sample that comes with the program: how it is made, and that its answer is right.
+//! The recorded sample that comes with the program: how it is created, and that its answer is right.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -22,7 +22,7 @@ use crate::solved::{handeye, text, utf8};
 const SCENE: &str = "realistic";
 const POSES: &str = "assets/poses/realistic20.toml";
 const SEED: &str = "35";
-/// So many of its poses.
+/// Number of its poses.
 const VIEWS: usize = 12;
 const QUALITY: u8 = 95;
 
@@ -47,8 +47,8 @@ fn sample() -> PathBuf {
     workspace_root().join("assets/samples/ur5")
 }
 
-/// Not a test: photographs the cell again, where the sample shall change.
-/// `cargo test -p handeye_tests -- --ignored photograph_the_sample`
+/// Not a test: photographs the cell again, if the sample has to change. `cargo test -p handeye_tests -- --ignored
+/// photograph_the_sample`
 #[test]
 #[ignore = "writes assets/samples/ur5"]
 fn photograph_the_sample() {
@@ -82,7 +82,7 @@ fn photograph_the_sample() {
     fs::write(folder.join("dataset.toml"), DESCRIPTION).expect("written");
 }
 
-/// Holds an answer against what the cell publishes of its camera and its board.
+/// Compares an answer with what the cell publishes about its camera and its board.
 fn assert_true(result: &CalibrationResult) {
     let cell = CellProcess::start(&["--scene", SCENE, "--seed", SEED]);
     let endpoint: Endpoint = format!("tcp://127.0.0.1:{}", cell.port()).parse().expect("an address");
@@ -99,9 +99,9 @@ fn assert_true(result: &CalibrationResult) {
         let covariance = link.and_then(TransformEstimate::covariance_matrix).expect("stated");
         let off = se3::log(&(found.inverse() * truth));
         let weighed = covariance.cholesky().expect("positive definite").solve(&off);
-        // 99.9 % of six numbers whose stated spread is true stay below it.
+        // 99.9 % of six numbers with a correctly stated spread are below it.
         assert!(off.dot(&weighed) < 22.46, "{:.1} by {off:?}", off.dot(&weighed));
-        // And it is an answer worth having.
+        // And it is a useful answer.
         assert!(off.fixed_rows::<3>(0).norm() < 0.3e-3, "{off:?}");
     }
     assert!(result.quality.tip_error_95_mm.is_some_and(|error| error < 0.3), "{:?}", result.quality);
@@ -136,7 +136,7 @@ fn the_sample_is_opened_as_a_session_of_its_own_and_solved() {
     }
 }
 
-/// Said on the command line, in the data set and in the window it is the same.
+/// Stated on the command line, in the data set and in the window it has the same effect.
 #[test]
 fn the_accuracy_of_the_robot_says_how_near_a_tool_arrives() {
     let calibrated = |folder: &Path, options: &[&str]| {
@@ -185,7 +185,7 @@ fn the_accuracy_of_the_robot_says_how_near_a_tool_arrives() {
     assert_eq!(solved(&mut bench, None).reach_error_95_mm, None);
 }
 
-/// A small recording that everybody downloads.
+/// A small recording, because every user downloads it.
 #[test]
 fn the_sample_is_small() {
     fn bytes(folder: &Path) -> u64 {

@@ -14,23 +14,24 @@ use serde_json::Value;
 /// From the last sign of a held button to an arm at rest.
 const AT_REST: Duration = Duration::from_millis(500);
 
-/// Presses of a button until the arm moves, and frames that each is waited for.
+/// Presses of a button until the arm moves, and frames to wait for each.
 const TRIES: usize = 40;
 const FRAMES: usize = 20;
 
-/// An arm that stays where it is for so long is at rest; a pass takes 50 ms.
+/// An arm that does not move for this long is at rest; a pass takes 50 ms.
 const STILL: Duration = Duration::from_millis(400);
 
-/// Fewer pixels than this differ in the age of the image and the folder of the user, with all that is around their letters.
+/// Fewer pixels than this differ because of the age of the image and the folder of the user, including the area around
+/// their letters.
 const ALIKE: usize = 2_000;
 
-/// How often a window and a page that do not look alike are looked at again.
+/// How often a window and a page that differ are compared again.
 const LOOKS: usize = 60;
 
 /// Height of the window on a screen of 900 points.
 const HEIGHT: u32 = 852;
 
-/// Where the bar at the bottom begins, in which the latest message may be another one.
+/// Where the bar at the bottom begins, where the latest message may differ.
 const STATUS_BAR: u32 = HEIGHT - 70;
 
 /// A browser without a graphics card keeps a machine busy by itself: one at a time.
@@ -45,7 +46,7 @@ fn shots(name: &str) -> PathBuf {
         .map_or_else(|| PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name), PathBuf::from)
 }
 
-/// From the start to exported files, with few clicks; and what the page said to its console on the way.
+/// From the start to exported files, with few clicks; and what the page wrote to its console meanwhile.
 fn first_user(desktop: &mut Desktop) {
     desktop.until_seen("Connected to the built-in cell");
     desktop.until_seen("Board in view");
@@ -81,7 +82,7 @@ fn a_first_user_gets_to_exported_files_in_a_browser_and_downloads_them() {
     let scene = hurried("reference", folder.path()).display().to_string();
     let mut desktop = Desktop::in_browser((1440, 900), false, &shots("served"), &["--scene", &scene]);
     first_user(&mut desktop);
-    // What the button asks for, as the page asks for it.
+    // The request of the button, as the page sends it.
     desktop.place_of("Download as one archive");
     let session = desktop.home().join("handeye-sessions");
     let session = std::fs::read_dir(session).expect("the sessions").flatten().next().expect("a session").path();
@@ -111,15 +112,15 @@ fn a_first_user_gets_to_exported_files_with_fingers_on_a_tablet() {
     first_user(&mut desktop);
 }
 
-/// The desktop window and the page are drawn by different programs out of the same triangles. What may differ is the last
-/// bit of a colour, and words about the time that has passed or the folder of the user.
+/// The desktop window and the page are drawn by different programs from the same triangles. Only the last bit of a colour
+/// may differ, and texts with the elapsed time or the folder of the user.
 #[test]
 fn the_page_shows_what_the_desktop_window_shows_pixel_for_pixel() {
     if !desktop::is_possible_in_browser() || !desktop::is_possible() {
         return;
     }
     let _alone = alone();
-    // A simulation that stands makes no images: nothing moves.
+    // A paused simulation makes no images: nothing moves.
     let cell = CellProcess::start(&[]);
     let address = Endpoint::local(cell.port()).to_string();
     let arguments = ["--rerun", "off", "--connect", &address];
@@ -131,13 +132,13 @@ fn the_page_shows_what_the_desktop_window_shows_pixel_for_pixel() {
             surface.until_seen("The simulation is stopped");
             surface.click(pane);
         }
-        // A window on a busy machine shows late what was clicked; what is different for good stays different.
+        // A window on a busy machine shows clicks late; a permanent difference remains.
         let differ = (0..LOOKS).map(|_| differing_pixels(&window, &page, pane)).find(|count| *count < ALIKE);
         assert!(differ.is_some(), "{pane}: {} pixels differ", differing_pixels(&window, &page, pane));
     }
 }
 
-/// How many pixels above the bar at the bottom are another colour on the page than in the window.
+/// How many pixels above the bar at the bottom have a different colour on the page than in the window.
 fn differing_pixels(window: &Desktop, page: &Desktop, pane: &str) -> usize {
     let [window, page] = [(window, "window"), (page, "page")].map(|(surface, name)| {
         image::open(surface.photograph(&format!("{name}-{pane}"))).expect("an image").into_rgb8()
@@ -163,7 +164,7 @@ fn hold_a_jog(desktop: &mut Desktop) {
     desktop.click("Hold");
     let place = desktop.place_of("Move +Z");
     let before = tip(desktop);
-    // On a machine that is busy enough the page is not heard in time, and the arm is let go as it has to be: a person
+    // On a very busy machine the page does not report in time, and the jog is released as it has to be: the user
     // presses again.
     for _ in 0..TRIES {
         let (browser, tab) = desktop.page();
@@ -180,7 +181,7 @@ fn hold_a_jog(desktop: &mut Desktop) {
     panic!("the arm does not move");
 }
 
-/// A cell whose time runs, its address, and its arm as others see it.
+/// A cell whose time runs, its address, and its arm as seen by other clients.
 fn running_cell() -> (CellProcess, String, Arm) {
     let cell = CellProcess::start(&[]);
     let endpoint = Endpoint::local(cell.port());
@@ -189,11 +190,11 @@ fn running_cell() -> (CellProcess, String, Arm) {
     (cell, endpoint.to_string(), arm)
 }
 
-/// The arm comes to rest in time, and stays there while the page comes back by `back` and is used again.
+/// The arm comes to rest in time, and stays there while the page is restored with `back` and used again.
 fn rests_and_comes_back(what: &str, desktop: &mut Desktop, arm: &mut Arm, back: impl FnOnce(&Desktop)) {
     let took = moves_for(arm);
     println!("{what}: the arm at rest after {:.0} ms", took.as_secs_f64() * 1e3);
-    // With half a second as the goal; a machine that builds beside it takes longer to everything.
+    // The goal is half a second; a machine that builds at the same time takes longer for everything.
     assert!(took < 4 * AT_REST, "{took:?}");
     let rested = arm.joint_values().expect("a call");
     back(desktop);
@@ -204,7 +205,7 @@ fn rests_and_comes_back(what: &str, desktop: &mut Desktop, arm: &mut Arm, back: 
     assert_eq!(arm.joint_values().expect("a call"), rested, "it goes on by itself");
 }
 
-/// How long the arm still moves; it is at rest when it stays where it is for some passes.
+/// How long the arm still moves; it is at rest when it does not move for some passes.
 fn moves_for(arm: &mut Arm) -> Duration {
     let began = Instant::now();
     let (mut last, mut moved) = (arm.joint_values().expect("a call"), began);
@@ -232,7 +233,7 @@ fn a_browser_that_stands_still_lets_go_of_the_arm_and_comes_back() {
     });
 }
 
-/// One megabit in a second, 200 ms to and fro, two packets lost of a hundred; then none at all.
+/// One megabit per second, a round trip of 200 ms, two percent packet loss; then no connection at all.
 #[test]
 fn over_a_bad_network_the_arm_rests_when_it_goes_and_the_page_comes_back() {
     if !desktop::is_possible_in_browser() {
@@ -256,7 +257,7 @@ fn over_a_bad_network_the_arm_rests_when_it_goes_and_the_page_comes_back() {
     });
 }
 
-/// A closed lid, or another page in front: the page is not run any more.
+/// A closed lid, or another page in front: the page is no longer running.
 #[test]
 fn a_page_that_is_frozen_lets_go_of_the_arm_and_comes_back() {
     if !desktop::is_possible_in_browser() {
@@ -274,7 +275,7 @@ fn a_page_that_is_frozen_lets_go_of_the_arm_and_comes_back() {
     rests_and_comes_back("a page that is frozen", &mut desktop, &mut arm, |desktop| freeze(desktop, false));
 }
 
-/// What has a name is there for the screen reader of the browser, and does what it says.
+/// Everything with a name is available to the screen reader of the browser, and works.
 #[test]
 fn a_screen_reader_finds_the_controls_and_presses_them() {
     if !desktop::is_possible_in_browser() {
@@ -294,12 +295,12 @@ fn a_screen_reader_finds_the_controls_and_presses_them() {
     browser.evaluate(tab, &format!("{}.click()", named("Jog")));
     browser.until(tab, &named("Move +Z"));
     browser.until(tab, &format!("{}.getAttribute('aria-pressed') === 'true'", named("Jog")));
-    // A field that is reached takes what is typed.
+    // A field that gets the focus takes typed text.
     let field =
         "[...document.querySelectorAll('#controls button')].find((b) => b.textContent.startsWith('Goal of joint 1'))";
     browser.evaluate(tab, &format!("{field}.click()"));
     assert_eq!(browser.evaluate(tab, "document.activeElement.id"), Value::from("typing"));
-    // Switched off, nothing is left, whatever is on its way.
+    // Switched off, nothing remains, whatever is in flight.
     browser.evaluate(tab, "document.getElementById('reads').click()");
     assert_eq!(browser.evaluate(tab, "document.querySelectorAll('#controls *').length"), Value::from(0));
 }
@@ -319,11 +320,11 @@ fn others_watch_stop_the_arm_and_take_over_with_one_click() {
     let (browser, driver) = desktop.page();
     assert_eq!(browser.evaluate(driver, "people.pages"), Value::from(2));
 
-    // What is done at a page that watches has no effect; its STOP has.
+    // Input at a page that only watches has no effect; its STOP has.
     hold_a_jog(&mut desktop);
     let (browser, _) = desktop.page();
     browser.evaluate(&watcher, "document.getElementById('stop').click()");
-    // The stop says so, and the jog that it ended: whichever comes last is seen.
+    // Both the stop and the jog that it ended report it: the last one is shown.
     desktop.until_seen("stopped");
 
     let (browser, driver) = desktop.page();
@@ -332,7 +333,7 @@ fn others_watch_stop_the_arm_and_take_over_with_one_click() {
     browser.until(driver, "!people.you && !document.getElementById('bar').hidden");
     std::fs::write(shots("served").join("watching.png"), browser.photograph(driver)).expect("written");
 
-    // The page that drives has gone: nobody drives until somebody wants to.
+    // The page that drives has gone: no page drives until a user requests it.
     browser.close(&watcher);
     browser.until(driver, "!people.driven");
     browser.evaluate(driver, "document.getElementById('drive').click()");
@@ -347,7 +348,7 @@ fn files_that_are_dropped_on_the_page_are_opened_as_a_session() {
     let _alone = alone();
     let mut desktop = Desktop::in_browser((1440, 900), false, &shots("served"), &[]);
     desktop.until_seen("Board in view");
-    // A recording as people have it, made by the command line on the built-in cell.
+    // A typical recording, made by the command line on the built-in cell.
     let folder = tempfile::tempdir().expect("a folder");
     let session = folder.path().join("recorded");
     let made = std::process::Command::new(handeye_tests::handeye_binary())

@@ -1,4 +1,4 @@
-//! STOP at a page, while the workbench is given the worst frames to draw that a page can ask for.
+//! STOP at a page, while the workbench has to draw the worst frames that a page can cause.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -12,29 +12,29 @@ use rand::{RngExt as _, SeedableRng as _};
 use serde_json::{Value, json};
 use tungstenite::Message;
 
-/// From STOP to an arm at rest, by the clock of the cell \[s\], on a machine that has time for it.
+/// From STOP to an arm at rest, by the clock of the cell \[s\], on a machine that is not busy.
 const AT_REST_S: f64 = 0.3;
 
-/// How many stops at a page of the workbench that draws. Half as many go, in turn with them, through a workbench beside it that
-/// has nothing to draw: the same way, on the same machine at the same time. Whatever else a machine is busy with makes stops of
-/// both late; waiting for a frame makes those of the first late.
+/// How many stops at a page of the workbench that draws. Half as many go, alternating with them, through a second workbench
+/// that has nothing to draw: the same path, on the same machine at the same time. Other load of the machine delays stops of
+/// both; waiting for a frame delays those of the first.
 const STOPS: usize = 50;
 
 /// How many standard deviations more late stops the first may have than twice those of the second. If a stop of either is late
-/// with the same small probability, the difference has a variance of twice the number of late stops: more than four come of
+/// with the same small probability, the difference has a variance of twice the number of late stops: more than four occur by
 /// chance once in thirty thousand runs.
 const DEVIATIONS: f64 = 4.0;
 
-/// Passes of the cell, short enough to tell how long it took \[s\].
+/// Passes of the cell, short enough to resolve the time to rest \[s\].
 const TIME_STEP_S: &str = "0.01";
 
 /// Share of the fastest speed at which the workbench moves an arm behind an address.
 const SHARE: f64 = 0.25;
 
-/// An arm that stays where it is for so long \[s\] is at rest.
+/// An arm that does not move for this long \[s\] is at rest.
 const STILL_S: f64 = 0.15;
 
-/// Bytes that are pasted at once: as many as a message has room for.
+/// Bytes that are pasted at once: as many as fit in a message.
 const PASTED: usize = 60_000;
 
 /// Longer than anything takes on a busy machine.
@@ -50,8 +50,8 @@ fn key(name: &str, modifiers: u8, down: bool) -> Value {
     json!({"e": "key", "key": name, "down": down, "modifiers": modifiers})
 }
 
-/// A page that has the palette open and pastes into it as fast as frames come, on the largest screen there is. Once for every
-/// time that it is asked to, it presses Esc.
+/// A page that has the palette open and pastes into it as fast as frames come, on the largest supported screen. On each
+/// request it presses Esc once.
 fn burden(mut page: Page, ends: &AtomicBool, escapes: &AtomicU64, frames: &AtomicU64) {
     tell(&mut page, &json!({"t": "screen", "width": 8000.0, "height": 8000.0, "scale": 2.0, "touch": false}));
     tell(&mut page, &json!({"t": "reads", "reads": true}));
@@ -83,7 +83,7 @@ fn burden(mut page: Page, ends: &AtomicBool, escapes: &AtomicU64, frames: &Atomi
     }
 }
 
-/// Says that the test has ended, also where it fails: a thread that draws on would be waited for.
+/// Signals that the test has ended, also if it fails: otherwise the drawing thread would be waited for.
 struct Over<'a>(&'a AtomicBool);
 
 impl Drop for Over<'_> {
@@ -150,7 +150,7 @@ fn stop_at_a_page_waits_for_no_frame() {
     std::thread::scope(|scope| {
         let over = Over(&ends);
         scope.spawn(|| burden(driver, &ends, &escapes, &frames));
-        // Whatever moves the arm: a client whose motions are none of the window's business.
+        // What moves the arm: a client whose motions the window does not control.
         let mut mover = arm(&cell);
         let start = watch.joint_values().expect("a call");
         let limits = MotionLimits::uniform(6, JOG_JOINT_SPEED_RAD_S * SHARE, 2.0, 20.0);
@@ -162,7 +162,7 @@ fn stop_at_a_page_waits_for_no_frame() {
         let (began, drawn) = (Instant::now(), frames.load(Ordering::Acquire));
         let (mut took, mut beside) = (Vec::new(), Vec::new());
         for trial in 0..STOPS + STOPS / 2 {
-            // A page that is not heard from for a while is let go of: each trial has its own.
+            // A silent page is disconnected: each trial has its own.
             let mut page = match trial % 3 {
                 0 => Some(served.page("watcher")),
                 1 => None,
@@ -173,7 +173,7 @@ fn stop_at_a_page_waits_for_no_frame() {
             goal[0] += if at[0] > start[0] { -2.0 } else { 2.0 };
             let limits = limits.clone();
             let moving = scope.spawn(move || {
-                // It is stopped on its way.
+                // It is stopped before it arrives.
                 let _stopped = mover.move_to_joints(&goal, &limits, &CancelToken::default()).is_ok();
                 mover
             });
@@ -209,7 +209,7 @@ fn stop_at_a_page_waits_for_no_frame() {
             late - 2.0 * late_beside <= DEVIATIONS * (2.0 * (late + late_beside)).sqrt(),
             "{took:?}\nbeside: {beside:?}"
         );
-        // Where half of them are late, a busy machine is no explanation: braking itself takes half of the time.
+        // If half of them are late, a busy machine is no explanation: braking itself takes half of the time.
         assert!(took[STOPS / 2] <= AT_REST_S, "{took:?}\nbeside: {beside:?}");
     });
 }

@@ -1,4 +1,4 @@
-//! The board tracked and followed on the built-in cell over its real socket, against where it really is.
+//! The board tracked and followed on the built-in cell over its real socket, compared with where it really is.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -21,7 +21,7 @@ fn handeye(arguments: &[&str]) -> Output {
     output
 }
 
-/// A calibration of the cell of a scene, as a user makes it.
+/// A calibration of the cell of a scene, as made by a user.
 fn calibrated(folder: &Path, scene: &str) -> PathBuf {
     let session = folder.join("session");
     let (out, scene) = (session.display().to_string(), workspace_root().join(scene).display().to_string());
@@ -68,7 +68,7 @@ fn a_moving_board_is_tracked_to_a_millimetre_and_a_tenth_of_a_degree() {
     assert!(number(summary, "tracked") >= 295.0, "{summary}");
     assert!(number(summary, "position_rms_mm") <= 1.0, "{summary}");
     assert!(number(summary, "rotation_rms_deg") <= 0.1, "{summary}");
-    // The board did move: the figures are not those of one that stood.
+    // The board did move: the figures are not those of a board at rest.
     let speeds = frames.iter().skip(100).filter_map(|frame| frame["base_from_target"]["velocity_m_s"].as_array());
     let speeds: Vec<f64> =
         speeds.map(|v| v.iter().map(|v| v.as_f64().expect("a number").powi(2)).sum::<f64>().sqrt()).collect();
@@ -113,7 +113,7 @@ fn our_point_and_the_tip_there_are_those_of_the_program_that_people_write_by_han
     let last = track["frames"].as_array().and_then(|frames| frames.last()).expect("a frame").clone();
     let base_from_target = pose(&last["base_from_target"]);
     let ours: Vec<Point3<f64>> = BOARD.points().iter().map(|point| base_from_target.isometry() * point).collect();
-    // Which of our corners is the one that OpenCV begins with.
+    // Which of our corners is OpenCV's first one.
     let nearest = |a: &&usize, b: &&usize| {
         let distance = |index: usize| (ours[index] - point).norm();
         distance(**a).total_cmp(&distance(**b))
@@ -144,7 +144,7 @@ fn our_point_and_the_tip_there_are_those_of_the_program_that_people_write_by_han
     assert!(apart_mm <= 1.0, "{apart_mm} mm");
 }
 
-/// As it is reported the same calibration brings the tip where nominal kinematics has it.
+/// With reported poses the same calibration brings the tip where nominal kinematics puts it.
 #[test]
 fn an_arm_whose_links_are_off_reaches_a_corner_by_corrected_commands() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -186,7 +186,7 @@ fn connected(endpoint: &str) -> Arm {
     cell.split().0
 }
 
-/// Where every program begins: the first reference pose, at rest.
+/// Where every program starts: the first reference pose, at rest.
 fn at_first_pose(endpoint: &str) -> Arm {
     let mut arm = connected(endpoint);
     arm.sim().start_simulation().expect("started");

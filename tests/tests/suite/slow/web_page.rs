@@ -1,4 +1,4 @@
-//! A page in a real browser that tries to command the cell of the user who looks at it.
+//! A page in a real browser that tries to command the cell of the user who views it.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
@@ -14,10 +14,10 @@ use handeye_tests::{CellProcess, hostile};
 /// Longer than a browser takes on a busy machine.
 const PATIENCE: Duration = Duration::from_mins(4);
 
-/// Length of what the page sends.
+/// Length of the page's messages.
 const BODY_BYTES: usize = 1024;
 
-/// What the page does: shows somebody what its requests look like, then sends each target one that is made to measure.
+/// What the page does: it first shows what its requests look like, then sends each target a tailored one.
 const SCRIPT: &str = "
     const post = (port, body) =>
         fetch(`http://127.0.0.1:${port}/`, { method: 'POST', mode: 'no-cors', body, signal: AbortSignal.timeout(20000) });
@@ -61,11 +61,11 @@ fn answer(stream: &mut BufReader<TcpStream>, kind: &str, body: &[u8]) {
         "HTTP/1.1 200 OK\r\nContent-Type: {kind}\r\nContent-Length: {}\r\nConnection: close\r\n\r\n",
         body.len()
     );
-    // A browser may have gone on to something else.
+    // The browser may have closed the connection.
     let _sent = stream.get_mut().write_all(head.as_bytes()).and_then(|()| stream.get_mut().write_all(body)).is_ok();
 }
 
-/// Serves the page and what it asks for, until it is done.
+/// Serves the page and its requests, until it is done.
 fn serve(pages: &TcpListener, recorder: (TcpListener, u16), targets: &[u16], request: &[u8], done: &Sender<()>) {
     let recorded = std::thread::spawn(move || {
         let (stream, _) = recorder.0.accept().expect("the page asks");
@@ -121,7 +121,7 @@ fn a_page_in_a_browser_moves_nothing() {
     let joint = arm.sim().get_object_index("/UR5/joint", 0).expect("a joint");
     let request = hostile::request("page", "sim.setJointPosition", vec![Value::from(joint.0), Value::Float(1.0)]);
     let before = arm.joint_values().expect("a call");
-    // A socket of the library, which takes the page for an old client: the attack is real.
+    // A socket of the library, which accepts the page as an old client: the attack is real.
     let router = zmq::Context::new().socket(zmq::ROUTER).expect("a socket");
     router.set_rcvtimeo(PATIENCE.as_millis() as i32).expect("an option");
     router.bind("tcp://127.0.0.1:*").expect("a port");

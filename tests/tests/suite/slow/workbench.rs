@@ -1,4 +1,4 @@
-//! A whole calibration by what a user clicks, on the built-in cell over its real socket.
+//! A whole calibration controlled by clicks, on the built-in cell over its real socket.
 
 use std::path::Path;
 
@@ -25,8 +25,8 @@ fn idle_and_fresh(model: &Model) -> bool {
     model.solve.status == SolveStatus::Idle && model.solve.fresh
 }
 
-/// A cell that keeps a pace, with the ten reference poses captured and solved. The cell comes with it; it
-/// has what CoppeliaSim has, so that a session there goes the same way.
+/// A paced cell, with the ten reference poses captured and solved. Returned with the cell, which has only what
+/// CoppeliaSim has, so that a session there works the same way.
 fn sequence_done(sessions: &Path) -> (Workbench, CellServer) {
     let mut scene = Scene::reference().expect("the scene");
     hurry(&mut scene);
@@ -44,7 +44,7 @@ fn sequence_done(sessions: &Path) -> (Workbench, CellServer) {
     (bench, cell)
 }
 
-/// A session with the ten reference poses captured, as the command line makes it in seconds, opened and solved.
+/// A session with the ten reference poses captured, as made by the command line in seconds, opened and solved.
 fn captured(folder: &Path) -> Workbench {
     let session = folder.join("captured");
     let made = std::process::Command::new(handeye_tests::handeye_binary())
@@ -182,7 +182,7 @@ fn a_stop_ends_the_sequence_and_keeps_what_was_captured() {
     bench.until("the arm at rest", |model| !model.sequence_runs && !model.stop_pending);
     let kept = bench.model().document().captures.len();
     assert!((2..10).contains(&kept), "{kept}");
-    // A session that the first capture began is a recent one as well.
+    // A session that was started by the first capture is a recent one as well.
     let recent = bench.model().recent.first().expect("a recent session");
     assert_eq!(recent.captures, kept);
     assert_eq!(Some(&recent.folder), bench.model().session.folder.as_ref());
@@ -241,10 +241,10 @@ fn recorded_images_and_poses_are_opened_as_a_session_and_stay_as_they_are() {
     let bench = captured(&folder.path().join("sessions"));
     let recorded = bench.model().session.folder.clone().expect("a session");
     drop(bench);
-    // A data set has no depths, and with them the answer is another one.
+    // A data set has no depths, and with them the answer would differ.
     std::fs::remove_dir_all(recorded.join("depth")).expect("depths");
     let expected = by_command_line(&recorded).hand_eye;
-    // What another program would have written: images, poses and their description, and nothing of ours.
+    // As written by another program: images, poses and their description, and nothing of ours.
     let dataset = folder.path().join("recorded");
     std::fs::create_dir_all(dataset.join("images")).expect("a folder");
     for file in ["dataset.toml", "poses.csv"] {

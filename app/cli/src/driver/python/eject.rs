@@ -1,4 +1,4 @@
-//! `handeye driver eject`: a driver as a file, to be changed.
+//! `handeye driver eject`: a driver as a file, to be modified.
 
 use std::path::PathBuf;
 
@@ -28,7 +28,7 @@ pub struct EjectArgs {
 pub fn eject(args: &EjectArgs) -> Result<(), Failure> {
     let Some(driver) = ALL.iter().find(|driver| driver.name == args.driver) else { return Ok(()) };
     let files = [(driver.file, driver.source), SHARED].map(|(file, source)| (args.out.join(file), source));
-    // The shared one is usually there for another driver.
+    // The shared one often exists already for another driver.
     let is_in_the_way =
         |path: &PathBuf, source: &str| std::fs::read(path).is_ok_and(|bytes| bytes != source.as_bytes());
     if let Some((path, _)) = files.iter().find(|(path, source)| !args.overwrite && is_in_the_way(path, source)) {

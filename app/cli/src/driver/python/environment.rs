@@ -1,4 +1,4 @@
-//! The virtual environment that a driver runs in: made in the cache the first time, and then used.
+//! The virtual environment that a driver runs in: created in the cache the first time, and then reused.
 
 use std::collections::hash_map::DefaultHasher;
 use std::fs::File;
@@ -17,11 +17,12 @@ use super::files::Shipped;
 use super::script::Needs;
 use crate::out;
 
-/// The Python that environments are made with.
+/// The Python that environments are created with.
 pub const PYTHON: &str = "python3";
-/// Written into an environment once it is whole.
+/// Written into an environment once it is complete.
 const COMPLETE: &str = "complete";
-/// How often the workbench hears that the environment is still being made: it waits ten seconds for the next word.
+/// How often the workbench is notified that the environment is still being created: it waits ten seconds for the next
+/// message.
 const STILL_AT_IT: Duration = Duration::from_secs(2);
 
 /// Why a driver has no Python to run with.
@@ -34,7 +35,7 @@ pub enum EnvironmentError {
     #[error("{}: {why}. XDG_CACHE_HOME names another folder for caches", path.display())]
     NotWritten {
         path: PathBuf,
-        /// What the system says.
+        /// The system's message.
         why: String,
     },
     /// No such program.
@@ -45,7 +46,7 @@ pub enum EnvironmentError {
     NoPython {
         /// What was started.
         python: PathBuf,
-        /// What the system says.
+        /// The system's message.
         why: String,
     },
     /// It is too old.
@@ -85,15 +86,15 @@ pub enum EnvironmentError {
 /// Who waits for an environment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Audience {
-    /// A person, who reads standard error.
+    /// A user, who reads standard error.
     Person,
     /// A workbench that awaits `hello` on standard output.
     Workbench,
 }
 
-/// The Python of a driver's environment, which is made where there is none yet.
+/// The Python of a driver's environment, which is created if it does not exist yet.
 pub fn python_of(driver: &Shipped, audience: Audience) -> Result<Command, EnvironmentError> {
-    // A test sees that every driver states its needs.
+    // A test checks that every driver states its needs.
     let needs =
         Needs::of(driver.source).unwrap_or_else(|| Needs { requires_python: ">=3".into(), dependencies: Vec::new() });
     let base = Base::of(Path::new(PYTHON))?;
@@ -105,7 +106,7 @@ pub fn python_of(driver: &Shipped, audience: Audience) -> Result<Command, Enviro
     let folder = cache.join(format!("{}-{:016x}", driver.name, key(&needs, &base)));
     ensure(&folder, driver.name, &needs, audience)?;
     let mut command = Command::new(folder.join("bin").join("python"));
-    // Those of a shell that is set up for ROS would come before the environment's own.
+    // The packages of a shell that is set up for ROS would come before the environment's own.
     command.env_remove("PYTHONPATH").env_remove("PYTHONHOME");
     Ok(command)
 }
@@ -135,7 +136,7 @@ impl Base {
     }
 }
 
-/// Other needs or another Python are another environment.
+/// Different needs or a different Python need a different environment.
 fn key(needs: &Needs, base: &Base) -> u64 {
     let mut hasher = DefaultHasher::new();
     needs.dependencies.hash(&mut hasher);
@@ -143,8 +144,8 @@ fn key(needs: &Needs, base: &Base) -> u64 {
     hasher.finish()
 }
 
-/// Makes an environment, unless it is there. One program makes it, others wait for that one; what was begun and not completed
-/// is made again.
+/// Creates an environment, unless it exists. One program creates it, others wait for that one; an incomplete one is created
+/// again.
 fn ensure(folder: &Path, name: &str, needs: &Needs, audience: Audience) -> Result<(), EnvironmentError> {
     let is_complete = || folder.join(COMPLETE).is_file() && folder.join("bin").join("python").is_file();
     if is_complete() {
@@ -182,7 +183,7 @@ fn make(folder: &Path, name: &str, needs: &Needs, audience: Audience) -> Result<
     Ok(())
 }
 
-/// Runs a program to its end, printing what it prints to standard error. Its last line where it fails, or how it ended.
+/// Runs a program to its end, printing its output to standard error. On failure its last line, or how it ended.
 fn run(command: &mut Command, audience: Audience) -> Result<(), String> {
     let started = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
     let mut child = started.map_err(|error| error.to_string())?;
@@ -200,19 +201,19 @@ fn boxed(output: impl Read + Send + 'static) -> Box<dyn Read + Send> {
     Box::new(output)
 }
 
-/// Prints lines to standard error as they come; gives the last one.
+/// Prints lines to standard error as they come; returns the last one.
 fn printed(output: Box<dyn Read + Send>) -> Option<String> {
     let lines = BufReader::new(output).lines().map_while(Result::ok);
     let lines = lines.map(|line| line.trim().to_owned()).filter(|line| !line.is_empty());
     lines.inspect(|line| out::note(format_args!("  {line}"))).last()
 }
 
-/// Does what takes long in a thread of its own, and sends a workbench meanwhile that the driver is being prepared.
+/// Does a long task on a thread of its own, and notifies a workbench meanwhile that the driver is being prepared.
 fn waited_for<T: Send + 'static>(audience: Audience, work: impl FnOnce() -> T + Send + 'static) -> T {
     let (send, done) = mpsc::channel();
     let worker = thread::spawn(move || {
         let result = work();
-        // Who waits for it is below.
+        // The receiver is below.
         let _waits = send.send(()).is_ok();
         result
     });
@@ -220,7 +221,7 @@ fn waited_for<T: Send + 'static>(audience: Audience, work: impl FnOnce() -> T + 
     while let Err(mpsc::RecvTimeoutError::Timeout) = done.recv_timeout(STILL_AT_IT) {
         if audience == Audience::Workbench {
             let line = json!({"type": "preparing", "text": "a Python environment is being made, once"});
-            // Where nobody reads it, the driver finds out.
+            // If nobody reads it, the driver will notice.
             let _written = writeln!(output, "{line}").and_then(|()| output.flush()).is_ok();
         }
     }

@@ -1,4 +1,4 @@
-//! The files of the drivers, in the program itself, and where they are written to be run.
+//! The files of the drivers, embedded in the program, and where they are written to be run.
 
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash as _, Hasher as _};
@@ -41,7 +41,7 @@ shipped! {
     V4L, "v4l", "v4l.py";
 }
 
-/// What they share: its file and what is in it.
+/// Their shared part: its file name and content.
 pub const SHARED: (&str, &str) = ("handeye_driver.py", include_str!("../../../../../assets/drivers/handeye_driver.py"));
 
 /// The folder of the program's cache for drivers.
@@ -50,8 +50,8 @@ pub fn cache() -> Result<PathBuf, EnvironmentError> {
     Ok(folders.cache_dir().join(settings::FOLDER).join("drivers"))
 }
 
-/// Writes the files of the drivers where they are not written yet. Each version of them has a folder of its own, so that one
-/// does not change what another runs.
+/// Writes the files of the drivers unless they exist. Each version of them has a folder of its own, so that one does not
+/// change what another runs.
 pub fn written() -> Result<PathBuf, EnvironmentError> {
     let mut hasher = DefaultHasher::new();
     for driver in ALL {

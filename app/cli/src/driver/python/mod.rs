@@ -1,4 +1,4 @@
-//! The drivers that come with the program, in Python: where their files are, with which Python they run, and that they are started.
+//! The drivers in Python that come with the program: where their files are, which Python they run with, and how they are started.
 
 mod eject;
 mod environment;
@@ -39,7 +39,7 @@ pub struct PythonArgs {
     options: Vec<OsString>,
 }
 
-/// Becomes the driver: its pipes and the signals for it are its own.
+/// Becomes the driver: it takes over the pipes and the signals.
 pub fn run(driver: &Shipped, args: &PythonArgs) -> Result<(), Failure> {
     let (python, options) = split(args)?;
     let folder = files::written().map_err(Failure::failed)?;
@@ -59,12 +59,12 @@ pub fn run(driver: &Shipped, args: &PythonArgs) -> Result<(), Failure> {
     Err(Failure::failed(environment::EnvironmentError::NoPython { python: program.into(), why: error.to_string() }))
 }
 
-/// A workbench, unless a person has started the driver in a terminal.
+/// A workbench, unless the user has started the driver in a terminal.
 fn audience() -> Audience {
     if std::io::stdout().is_terminal() { Audience::Person } else { Audience::Workbench }
 }
 
-/// Makes the environment of one of these drivers, where a command line starts one that has none yet.
+/// Creates the environment of one of these drivers, if a command line starts one that has none yet.
 pub fn prepare(words: &[String]) -> Result<(), Failure> {
     let [_, command, name, options @ ..] = words else { return Ok(()) };
     let Some(driver) = files::ALL.iter().find(|driver| command == "driver" && driver.name == name) else {
@@ -76,7 +76,7 @@ pub fn prepare(words: &[String]) -> Result<(), Failure> {
     environment::python_of(driver, Audience::Person).map(drop).map_err(Failure::failed)
 }
 
-/// Takes `--python` out of the options, wherever it is.
+/// Removes `--python` from the options, wherever it is.
 fn split(args: &PythonArgs) -> Result<(Option<PathBuf>, Vec<OsString>), Failure> {
     let mut python = args.python.clone();
     let mut rest = Vec::new();

@@ -1,4 +1,4 @@
-//! What a script says of itself at its top, as [PEP 723](https://peps.python.org/pep-0723/) has it.
+//! The metadata at the top of a script, as in [PEP 723](https://peps.python.org/pep-0723/).
 
 use serde::Deserialize;
 
@@ -13,7 +13,7 @@ pub struct Needs {
 }
 
 impl Needs {
-    /// Those of a script; `None` where it does not state them.
+    /// The needs of a script; `None` if it does not state them.
     pub fn of(source: &str) -> Option<Self> {
         let block =
             source.lines().skip_while(|line| *line != "# /// script").skip(1).take_while(|line| *line != "# ///");
@@ -21,7 +21,7 @@ impl Needs {
         toml::from_str(&text.join("\n")).ok()
     }
 
-    /// Whether a Python is new enough. Only a least version is stated.
+    /// Whether a Python is new enough. Only a minimum version is stated.
     pub fn has_python(&self, (major, minor): (u32, u32)) -> bool {
         let least = self.requires_python.strip_prefix(">=").and_then(|least| least.split_once('.'));
         let least = least.and_then(|(major, minor)| Some((major.parse().ok()?, minor.parse().ok()?)));

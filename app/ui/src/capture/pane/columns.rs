@@ -64,11 +64,11 @@ impl Column {
         Self::Flags,
     ];
 
-    /// What a narrow table does without, first what is missed least; the row under the pointer says it in words.
+    /// The columns that a narrow table omits, least important first; the row under the pointer shows them in words.
     const DISPENSABLE: [Self; 6] =
         [Self::Noise, Self::Turn, Self::Correction, Self::Influence, Self::Image, Self::Purpose];
 
-    /// Least width in points.
+    /// Minimum width in points.
     fn width(self) -> f32 {
         match self {
             Self::Image => 54.0,
@@ -81,7 +81,7 @@ impl Column {
         }
     }
 
-    /// How much of the room that is left it takes.
+    /// Its share of the remaining room.
     fn stretch(self) -> f32 {
         match self {
             Self::Name => 2.0,
@@ -91,12 +91,12 @@ impl Column {
         }
     }
 
-    /// Whether its content stands at the right, as numbers do.
+    /// Whether its content is right-aligned, as numbers are.
     pub fn is_number(self) -> bool {
         matches!(self, Self::Rms | Self::Correction | Self::Turn | Self::Influence | Self::Noise)
     }
 
-    /// What stands over it.
+    /// Its heading.
     pub fn name(self, language: Language) -> &'static str {
         match self {
             Self::Image => "",
@@ -112,7 +112,7 @@ impl Column {
         }
     }
 
-    /// Of its numbers.
+    /// Unit of its numbers.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Rms | Self::Noise => "px",
@@ -156,7 +156,7 @@ impl Column {
         shown
     }
 
-    /// The columns that it has none for.
+    /// The columns that do not fit.
     pub fn hidden(room: f32) -> impl Iterator<Item = Self> {
         let shown = Self::shown(room);
         Self::ALL.into_iter().filter(move |column| !shown.contains(column))
@@ -180,7 +180,7 @@ impl Column {
         columns.iter().map(|column| column.width()).sum()
     }
 
-    /// What a row of the table says in a column of numbers.
+    /// The value of a row of the table in a column of numbers.
     pub fn number(self, row: &CaptureRow) -> Option<f64> {
         match self {
             Self::Rms => row.rms_px,
@@ -221,7 +221,7 @@ pub fn sorted(rows: &[CaptureRow], sort: Sort) -> Vec<usize> {
     order
 }
 
-/// The heads of the columns; gives the sort after a click on one.
+/// The heads of the columns; returns the sort after a click on one.
 pub fn heads_ui(ui: &mut Ui, row: Rect, sort: Sort, language: Language) -> Sort {
     let palette = Palette::of(ui);
     let mut next = sort;
@@ -238,7 +238,7 @@ pub fn heads_ui(ui: &mut Ui, row: Rect, sort: Sort, language: Language) -> Sort 
             WidgetInfo::labeled(WidgetType::Button, true, label)
         });
         if response.clicked() {
-            // The first click on numbers brings the largest to the top: those are what one looks for.
+            // The first click on numbers brings the largest to the top: those are usually wanted.
             let descending = if sort.column == column { !sort.descending } else { column.is_number() };
             next = Sort { column, descending };
         }
@@ -261,7 +261,7 @@ pub fn heads_ui(ui: &mut Ui, row: Rect, sort: Sort, language: Language) -> Sort 
     next
 }
 
-/// A small triangle beside the head of the column that sorts.
+/// A small triangle next to the head of the column that sorts.
 fn arrow(ui: &Ui, words: Rect, at_left: bool, descending: bool) {
     let x = if at_left { words.left() - 8.0 } else { words.right() + 8.0 };
     let centre = Pos2::new(x, words.center().y);

@@ -11,7 +11,7 @@ use handeye_workbench::tr;
 /// One remark.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flag {
-    /// How bad it is; `None` for what is merely so.
+    /// How bad it is; `None` for a neutral remark.
     pub tone: Option<Tone>,
     /// In a word or two.
     pub name: &'static str,
@@ -19,7 +19,7 @@ pub struct Flag {
     pub why: String,
 }
 
-/// What is known besides the row.
+/// What is known in addition to the row.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Circumstances {
     /// The line between good and bad residuals \[px\].
@@ -45,7 +45,7 @@ pub fn weight(row: &CaptureRow) -> u8 {
         + u8::from(row.excluded)
 }
 
-/// Why the estimate set a capture aside, and what to do; `None` when it did not.
+/// Why the estimate excluded a capture, and what to do; `None` if it did not.
 fn why_aside(row: &CaptureRow, language: Language) -> Option<String> {
     let aside = row.aside.filter(|_| row.is_aside())?;
     let why = match aside.board_off {
@@ -66,7 +66,7 @@ fn why_aside(row: &CaptureRow, language: Language) -> Option<String> {
     Some(why.in_language(language))
 }
 
-/// The same of single corners.
+/// The same for single corners.
 fn why_corners_aside(row: &CaptureRow, language: Language) -> Option<String> {
     let why = text!(
         "Corners of this image that are far from where the rest of it puts them, and which the answer is without: \

@@ -1,4 +1,4 @@
-//! The captures of the session: take, judge, leave out.
+//! The captures of the session: take, judge, exclude.
 
 mod columns;
 mod flags;
@@ -31,9 +31,9 @@ use handeye_workbench::{capture, session, taught};
 const MOST_FRAMES: u32 = 64;
 /// A lower pane has lower buttons and rows, so that there is room for some.
 const LOW: f32 = 300.0;
-/// Height of what stands in place of the table, in the narrowest pane of a window of 1024 × 700.
+/// Height of what is shown in place of the table, in the narrowest pane of a window of 1024 × 700.
 const NOTHING_YET: f32 = 130.0;
-/// Height of the line at the bottom that says how captures go.
+/// Height of the line at the bottom that shows how captures go.
 const STATUS: f32 = 36.0;
 
 /// The pane.
@@ -138,7 +138,7 @@ fn actions_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, height: f32, out
     });
 }
 
-/// The whole set from one click: what somebody wants who has never calibrated anything.
+/// The whole set with one click: for a user who has never calibrated anything.
 fn sequence_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, height: f32, outbox: &mut Outbox) {
     let language = model.view.language;
     if model.sequence_runs {
@@ -222,7 +222,7 @@ fn selected_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Ou
     }
 }
 
-/// How many captures there are of each kind that there is.
+/// How many captures there are of each kind that occurs.
 fn counted(table: &CaptureTable, language: Language) -> String {
     let (fit, aside) = (table.count(CaptureUse::Fit), table.count(CaptureUse::Rejected));
     let others = [
@@ -235,7 +235,7 @@ fn counted(table: &CaptureTable, language: Language) -> String {
     parts.join(" · ")
 }
 
-/// Why the last capture was refused, once the image no longer says so.
+/// Why the last capture was refused, once the image no longer shows it.
 fn kept_refusal(model: &Model) -> Option<&CaptureRefused> {
     model.refused.as_ref().filter(|_| !stands_over_image(model))
 }

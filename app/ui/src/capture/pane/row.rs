@@ -24,7 +24,7 @@ pub const HEIGHT: f32 = 40.0;
 /// The same with both in one line.
 pub const LOW_HEIGHT: f32 = 28.0;
 
-/// Draws a row in its place; gives what the pointer does to it.
+/// Draws a row in its place; returns the pointer's interaction.
 pub fn row_ui(
     ui: &mut Ui,
     model: &Model,
@@ -94,7 +94,7 @@ pub fn row_ui(
     }
 }
 
-/// What a row says in columns that it has no room for.
+/// The values of a row in columns that do not fit.
 fn hidden(row: &CaptureRow, width: f32, language: Language) -> Option<String> {
     let reported = |column: Column| {
         let value = numbers::fixed(column.number(row)?, column.decimals(), 0);
@@ -170,7 +170,7 @@ fn use_ui(ui: &mut Ui, row: &CaptureRow, cell: Rect, language: Language, outbox:
 fn number(ui: &Ui, model: &Model, row: &CaptureRow, cell: Rect, column: Column) {
     let value = column.number(row);
     let palette = Palette::of(ui);
-    // What belongs to another set of captures is drawn like a memory.
+    // What belongs to another set of captures is drawn dimmed.
     let is_current = model.solve.fresh && !row.excluded;
     let colour = if is_current && value.is_some() { palette.text } else { palette.weak };
     let words = value.map_or_else(|| "–".to_owned(), |value| numbers::fixed(value, column.decimals(), 0));

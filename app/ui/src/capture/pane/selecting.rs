@@ -4,8 +4,7 @@ use egui::Modifiers;
 use handeye_session::CaptureId;
 
 /// The selection after a click on a row. `order` is that of the rows on the screen; the last one selected is the one
-/// that is looked at. With Shift the rows from `anchor` to the clicked one are selected, with Ctrl one is added or
-/// taken away.
+/// that is shown. With Shift the rows from `anchor` to the clicked one are selected, with Ctrl one is added or removed.
 pub fn clicked(
     order: &[CaptureId],
     selection: &[CaptureId],
@@ -28,7 +27,7 @@ pub fn clicked(
     }
 }
 
-/// The row above or below the one that is looked at; the first or last one when there is none.
+/// The row above or below the one that is shown; the first or last one when none is.
 pub fn neighbour(order: &[CaptureId], current: Option<CaptureId>, down: bool) -> Option<CaptureId> {
     let at = current.and_then(|id| order.iter().position(|&other| other == id));
     match (at, down) {

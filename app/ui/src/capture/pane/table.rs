@@ -15,7 +15,7 @@ use handeye_workbench::model::{CapturePurpose, Model, RefusalKind};
 use handeye_workbench::tr;
 use handeye_workbench::{motion, session};
 
-/// What the table remembers from one frame to the next: how it is looked at.
+/// What the table remembers from one frame to the next: how it is viewed.
 #[derive(Debug, Clone, Copy, Default)]
 struct Look {
     sort: Sort,
@@ -36,7 +36,7 @@ pub fn table_ui(
 ) {
     let key = Id::new("look of the table of captures");
     let mut look: Look = ui.data(|data| data.get_temp(key)).unwrap_or_default();
-    // What the bar that scrolls the rows takes is no room for the last column.
+    // The scroll bar of the rows leaves no room for the last column.
     let width = ui.available_width() - ui.spacing().scroll.allocated_width();
     ui.spacing_mut().item_spacing = Vec2::ZERO;
     let (heads, _) = ui.allocate_exact_size(Vec2::new(width, HEAD), Sense::hover());
@@ -114,7 +114,7 @@ fn keys_ui(ui: &Ui, model: &Model, order: &[CaptureId], look: &mut Look, outbox:
                 && let Some(next) = selecting::neighbour(order, model.selection.last().copied(), down)
             {
                 select(model, order, next, modifiers, look, outbox);
-                // Keys go where the pointer does not see.
+                // Keys select rows that may be out of view.
                 look.in_view = None;
             }
         }
@@ -127,7 +127,7 @@ fn keys_ui(ui: &Ui, model: &Model, order: &[CaptureId], look: &mut Look, outbox:
     }
 }
 
-/// Moves the rows when another capture is looked at: by keys, or by a click in a chart.
+/// Moves the rows when another capture is shown: by keys, or by a click in a chart.
 fn bring_into_view(ui: &Ui, model: &Model, order: &[CaptureId], look: &mut Look, place: impl Fn(usize) -> Rect) {
     let current = model.selection.last().copied();
     if current == look.in_view {
@@ -139,7 +139,7 @@ fn bring_into_view(ui: &Ui, model: &Model, order: &[CaptureId], look: &mut Look,
     }
 }
 
-/// Whether the last capture was refused because the robot stands where this one was taken. It may have moved since.
+/// Whether the last capture was refused because the robot is where this one was taken. It may have moved since.
 fn refused_here(model: &Model, id: CaptureId) -> bool {
     let too_similar = model.refused.as_ref().is_some_and(|refused| refused.kind == RefusalKind::TooSimilar);
     let (true, Some(robot), Some(record)) = (too_similar, &model.robot, model.document().capture(id)) else {

@@ -1,4 +1,5 @@
-//! Which drivers the window is to work with: those that come with the program, each with its fields, or another program.
+//! Which drivers the window should work with: those that come with the program, each with its fields, or another
+//! program.
 
 use egui::{ComboBox, TextEdit, Ui, WidgetInfo, WidgetType};
 
@@ -9,10 +10,10 @@ use handeye_workbench::model::{CellSource, Drivers, Model};
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
-/// Width of what is entered \[points\].
+/// Width of the input fields \[points\].
 const FIELD: f32 = 300.0;
 
-/// What is chosen and typed; it belongs to nothing but the window.
+/// What is chosen and typed; known to the window only.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draft {
     robot: Seat,
@@ -24,7 +25,7 @@ pub struct Draft {
 struct Seat {
     part: Part,
     choice: Choice,
-    /// What the driver that comes with the program is told.
+    /// The options of the driver that comes with the program.
     values: Values,
     /// The command or address of another one.
     typed: String,
@@ -32,7 +33,7 @@ struct Seat {
 
 #[derive(Debug, Clone, Copy)]
 enum Choice {
-    /// None of its own: the robot's has the camera.
+    /// No driver of its own: the robot's has the camera.
     Same,
     Offered(&'static Offered),
     Other,
@@ -49,7 +50,7 @@ impl PartialEq for Choice {
 }
 
 impl Seat {
-    /// As a command line has it.
+    /// From a command line.
     fn of(part: Part, command: Option<String>, otherwise: Choice) -> Self {
         let Some(command) = command else {
             return Self { part, choice: otherwise, values: Values::new(), typed: String::new() };
@@ -60,7 +61,7 @@ impl Seat {
         }
     }
 
-    /// The command or address, once it is whole.
+    /// The command or address, once it is complete.
     fn command(&self) -> Option<String> {
         match self.choice {
             Choice::Same => None,
@@ -70,7 +71,7 @@ impl Seat {
     }
 }
 
-/// The fields; the cell, once they name one. A freehand cell has a camera alone.
+/// The fields; the cell, once they define one. A freehand cell has only a camera.
 pub fn drivers_ui(ui: &mut Ui, model: &Model, freehand: bool, draft: &mut Option<Draft>) -> Option<CellSource> {
     let language = model.view.language;
     let known = known(model, freehand);
@@ -112,7 +113,7 @@ pub fn drivers_ui(ui: &mut Ui, model: &Model, freehand: bool, draft: &mut Option
 }
 
 impl Draft {
-    /// As it was connected to; the first of the list where nothing was.
+    /// As last connected; the first of the list if nothing was.
     fn of(drivers: &Drivers, freehand: bool) -> Self {
         let first = |part| offered::of_part(part).next().map_or(Choice::Other, Choice::Offered);
         let without_camera = if freehand { first(Part::Camera) } else { Choice::Same };
@@ -123,7 +124,7 @@ impl Draft {
     }
 }
 
-/// Those that are used and were used before, newest first, of this kind.
+/// Drivers in use and used before, newest first, of this kind.
 fn known(model: &Model, freehand: bool) -> Vec<Drivers> {
     let now = match &model.source {
         CellSource::Drivers(drivers) => Some(drivers),
@@ -133,7 +134,7 @@ fn known(model: &Model, freehand: bool) -> Vec<Drivers> {
     now.into_iter().chain(earlier).filter(|drivers| drivers.robot.is_none() == freehand).cloned().collect()
 }
 
-/// Which driver a part of the cell has, and what it is told.
+/// Which driver a part of the cell has, and its options.
 fn seat_ui(ui: &mut Ui, language: Language, [name, label]: [&str; 2], seat: &mut Seat, none: Option<Choice>) {
     let list = none.into_iter().chain(offered::of_part(seat.part).map(Choice::Offered)).chain([Choice::Other]);
     let before = seat.choice;
@@ -147,7 +148,7 @@ fn seat_ui(ui: &mut Ui, language: Language, [name, label]: [&str; 2], seat: &mut
         shown.response.widget_info(|| WidgetInfo::labeled(WidgetType::ComboBox, true, label));
     });
     if seat.choice != before {
-        // What belongs to one driver says nothing to another; the command line is a beginning for another program.
+        // The options of one driver mean nothing to another; the command line is a start for another program.
         if let Choice::Offered(offered) = before {
             seat.typed = offered.command(seat.part, &seat.values).unwrap_or_default();
         }
@@ -239,7 +240,7 @@ fn text_ui(ui: &mut Ui, of: &str, name: &str, example: &str, value: &mut String)
     field.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, named(of, name)));
 }
 
-/// The name of a field for those who do not see under which driver it is.
+/// The name of a field for users who do not see under which driver it is.
 fn named(of: &str, name: &str) -> String {
     format!("{of}: {name}")
 }

@@ -35,13 +35,13 @@ pub fn formats_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     }
 }
 
-/// Formats that are chosen and can hold this result.
+/// Formats that are chosen and can represent this result.
 pub fn chosen(model: &Model) -> Vec<&'static str> {
     let names = handeye_export::formats().iter().map(|format| format.name());
     names.filter(|name| model.export.chosen.contains(*name) && is_possible(model, name)).collect()
 }
 
-/// One without a preview yet is taken to be possible.
+/// One without a preview yet is assumed to be possible.
 fn is_possible(model: &Model, name: &str) -> bool {
     !matches!(model.export.previews.get(name), Some(Err(_)))
 }

@@ -27,7 +27,7 @@ pub fn export_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         if let Some(reason) = blocked(model) {
             parts::notice_ui(ui, Tone::Warning, reason, |_| ());
         }
-        // First, so that what the pane is for is never out of sight.
+        // First, so that the main button of the pane is never out of sight.
         written::write_ui(ui, model, outbox);
         written::written_ui(ui, model);
         formats::formats_ui(ui, model, outbox);

@@ -1,4 +1,4 @@
-//! Names of frames and files, and what the transform in the files means with them.
+//! Names of frames and files, and what the transform in the files means under these names.
 
 use egui::{Grid, Id, Label, RichText, TextEdit, Ui};
 use handeye_estimate::handeye::Mode;
@@ -27,7 +27,7 @@ pub fn names_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     parts::section_ui(ui, tr!(language, "Names"));
     let id = Id::new("names of the export");
     let mut draft: Draft = parts::remembered(ui, id);
-    // What came from elsewhere in the meantime, as by undo, counts more than an unfinished edit.
+    // A change from elsewhere in the meantime, as by undo, overrides an unfinished edit.
     if draft.from.as_ref() != Some(&model.export.names) {
         draft = Draft { from: None, names: model.export.names.clone() };
     }
@@ -74,7 +74,7 @@ pub fn names_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     parts::remember(ui, id, draft);
 }
 
-/// The sentence that says which way the transform goes.
+/// The sentence that states the direction of the transform.
 fn meaning_ui(ui: &mut Ui, model: &Model, names: &ExportNames) {
     let mode = model.solve.solved.as_ref().and_then(|solved| solved.result.mode);
     let parent = match mode {

@@ -8,7 +8,7 @@ use handeye_wording::text;
 use handeye_workbench::model::{Model, PreviewFile};
 use handeye_workbench::tr;
 
-/// No text is shown higher than this before it scrolls.
+/// Texts higher than this scroll.
 const MOST_HEIGHT: f32 = 260.0;
 
 /// All files of a format. What was not there a frame ago is brought into view.
@@ -16,7 +16,7 @@ pub fn preview_ui(ui: &mut Ui, model: &Model, format: &str) {
     let language = model.view.language;
     let preview = ui.scope(|ui| match model.export.previews.get(format) {
         None => parts::hint_ui(ui, tr!(language, "It is being prepared…")),
-        // The row above says why there is none.
+        // The row above shows why there is none.
         Some(Err(_)) => {}
         Some(Ok(files)) => files.iter().for_each(|file| file_ui(ui, model, file)),
     });

@@ -1,4 +1,4 @@
-//! Writing the files, and what came of it.
+//! Writing the files, and the outcome.
 
 use std::path::Path;
 

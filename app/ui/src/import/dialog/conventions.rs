@@ -1,4 +1,4 @@
-//! What a person fixes of a recording.
+//! What the user fixes about a recording.
 
 use egui::{ComboBox, Ui, WidgetInfo, WidgetType};
 

@@ -1,4 +1,4 @@
-//! What lies over an image in words: how fresh it is, that it is recorded, how a capture goes.
+//! What is shown over an image in words: how fresh it is, that it is recorded, how a capture goes.
 
 use std::path::PathBuf;
 
@@ -44,7 +44,7 @@ pub fn badges_ui(
         let words = text!("{rate} fps · {age} s old", rate = format!("{rate:.0}"), age = format!("{age_s:.1}"));
         let colour = if stale { Marks::over_images().review } else { Color32::from_gray(215) };
         lines.push((words.in_language(language), colour));
-        // What is less than the error that is good enough is no reason to wait.
+        // An offset below the error that is good enough is no reason to wait.
         if frame.info.image_off_m > model.view.goal.0 {
             let ms = format!("{:.0}", frame.info.image_age_s * 1e3);
             let words = text!("Image up to {ms} ms older than the pose: let the arm stand", ms = ms);
@@ -70,7 +70,7 @@ pub fn badges_ui(
     }
 }
 
-/// The strip that says that an image is recorded, and the way back.
+/// The strip that shows that an image is recorded, and the way back.
 pub fn review_ui(ui: &mut Ui, model: &Model, id: CaptureId, outbox: &mut Outbox) {
     let language = model.view.language;
     let colours = Marks::of(ui);
@@ -116,7 +116,7 @@ pub fn reading_ui(ui: &mut Ui, model: &Model, id: CaptureId, outbox: &mut Outbox
     });
 }
 
-/// How the capture goes that is under way, or why the last one was refused; and a flash when there is a new one.
+/// The state of the capture that is under way, or why the last one was refused; and a flash when there is a new one.
 pub fn capture_ui(ui: &mut Ui, model: &Model, room: Rect, in_words: bool, outbox: &mut Outbox) {
     if model.review.is_none() {
         flash(ui, model, room);

@@ -29,8 +29,8 @@ const FOOTER: f32 = 46.0;
 /// Distance of text to the edge of a pane.
 const INSET: f32 = 10.0;
 
-/// The colour image with everything drawn over it. Gives the pixel under the pointer: of both images one at most
-/// has one, and whoever draws both tells the model with `live::Command::PointAt`.
+/// The colour image with everything drawn over it. Returns the pixel under the pointer: at most one of both images has
+/// one, and the caller that draws both passes it to the model with `live::Command::PointAt`.
 pub fn colour_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, outbox: &mut Outbox) -> Option<ImagePoint> {
     let language = model.view.language;
     let shown = match content(model, textures) {
@@ -61,7 +61,7 @@ pub fn colour_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, outbox: &m
     )
 }
 
-/// The depth image. Gives the pixel of the colour image under the pointer, as [`colour_ui`] does.
+/// The depth image. Returns the pixel of the colour image under the pointer, as [`colour_ui`] does.
 pub fn depth_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, outbox: &mut Outbox) -> Option<ImagePoint> {
     let language = model.view.language;
     let Content::Images(shown) = content(model, textures) else {
@@ -109,7 +109,7 @@ fn content<'a>(model: &'a Model, textures: &LiveTextures) -> Content<'a> {
     }
 }
 
-/// A line at the top, an image, and a line at the bottom. Gives what the image gives.
+/// A line at the top, an image, and a line at the bottom. Returns the result of the image.
 fn tile_ui<R>(
     ui: &mut Ui,
     model: &Model,

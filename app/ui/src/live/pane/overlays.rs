@@ -19,23 +19,23 @@ use handeye_workbench::tr;
 
 /// How far the axes reach, in squares of the board.
 const AXIS_SQUARES: f64 = 3.0;
-/// A large residual is drawn as long as corners are apart, within these bounds [points]: shorter it is not seen, and longer
-/// it covers the board.
+/// A large residual is drawn as long as corners are apart, within these bounds [points]: shorter ones are not seen, and
+/// longer ones cover the board.
 const LONG: std::ops::RangeInclusive<f64> = 6.0..=24.0;
-/// Factors that can be read off in the head. Nothing is drawn shorter than it is.
+/// Factors that are easy for mental arithmetic. Nothing is drawn shorter than it is.
 const EXAGGERATIONS: [f64; 10] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0];
-/// What is left of a sight of the board that is some frames old.
+/// Opacity of a detection of the board that is some frames old.
 const OLD_SIGHT: f32 = 0.35;
 
 /// The board as it was seen in the image that is shown, or a little earlier.
 struct ShownDetection<'a> {
     corners: &'a [Corner],
     camera_from_target: Option<Pose<Camera, Target>>,
-    /// 1 when it is of this image, less when it is of an earlier one.
+    /// 1 if it is of this image, less if it is of an earlier one.
     strength: f32,
 }
 
-/// Everything that is switched on; gives how many times as long as they are the residuals are drawn, if they are.
+/// Everything that is switched on; returns by which factor the residuals are exaggerated, if they are drawn.
 pub fn paint(ui: &Ui, painter: &Painter, model: &Model, shown: &Shown<'_>, place: &Place) -> Option<f64> {
     let overlays = model.view.overlays;
     if overlays.coverage {
@@ -77,7 +77,7 @@ fn sight<'a>(model: &'a Model, shown: &Shown<'_>) -> Option<ShownDetection<'a>> 
     })
 }
 
-/// How strongly a sight of the board is drawn over an image that came so many frames later.
+/// How strongly a detection of the board is drawn over an image that came this many frames later.
 pub fn strength(frames_later: u64) -> f32 {
     (1.0 - 0.2 * frames_later.min(100) as f32).max(OLD_SIGHT)
 }
@@ -144,8 +144,8 @@ fn axes(painter: &Painter, projector: &Projector<'_>, target: &TargetSpec, stren
     }
 }
 
-/// Where the board is expected in the image that is shown: where tracking has it in the live one while it is tracked,
-/// because it may then be anywhere; otherwise where robot pose and calibration say that it is. With the calibration that it is by.
+/// Where the board is expected in the image that is shown: where tracking finds it in the live one while it is tracked, because it
+/// may then be anywhere; otherwise where robot pose and calibration predict it. With the calibration used.
 pub fn expected<'a>(model: &'a Model, shown: &Shown<'_>) -> Option<(&'a Predictor, Pose<Camera, Target>)> {
     let base_from_tip = shown.base_from_tip.as_ref()?;
     if shown.capture.is_some() || !model.track.on {
@@ -164,7 +164,7 @@ pub fn expected<'a>(model: &'a Model, shown: &Shown<'_>) -> Option<(&'a Predicto
 fn predicted(painter: &Painter, model: &Model, shown: &Shown<'_>, target: &TargetSpec, place: &Place) {
     let Some((calibrated, camera_from_target)) = expected(model, shown) else { return };
     let projector = Projector { intrinsics: &calibrated.intrinsics, camera_from_target, place };
-    // An answer of another set of captures is drawn, but does not shine.
+    // An answer for another set of captures is drawn dimmed.
     let colour = Marks::over_images().predicted.gamma_multiply(if model.solve.fresh { 1.0 } else { 0.5 });
     let lines = board_lines(target);
     for [from, to] in &lines.inside {
@@ -179,7 +179,7 @@ fn predicted(painter: &Painter, model: &Model, shown: &Shown<'_>, target: &Targe
     }
 }
 
-/// Where the board will be at the pose that guided capture goes to next.
+/// Where the board will be at the next pose of guided capture.
 fn next_board(painter: &Painter, model: &Model, shown: &Shown<'_>, target: &TargetSpec, place: &Place) {
     let next = model.planned_poses().first().filter(|_| shown.capture.is_none());
     let (Some(calibrated), Some(next)) = (model.calibrated(), next) else { return };
@@ -226,8 +226,8 @@ fn coverage(painter: &Painter, table: &CaptureTable, place: &Place) {
     }
 }
 
-/// Where the corners of the live image should be: by the board's pose in this one image while it is tracked, since
-/// the calibrated board is no longer there; otherwise by robot and calibration alone.
+/// Where the corners of the live image should be: from the board's pose in this one image while it is tracked, since
+/// the calibrated board is no longer there; otherwise from robot and calibration alone.
 pub fn live_chain(model: &Model) -> Option<Pose<Camera, Target>> {
     let (calibrated, detection) = (model.calibrated()?, model.detection.as_ref()?);
     if model.track.on {
@@ -238,7 +238,7 @@ pub fn live_chain(model: &Model) -> Option<Pose<Camera, Target>> {
 }
 
 /// Measured minus predicted, exaggerated: a recorded image has those of its fit or verification, the live one those of
-/// the bare chain, or of the pose of the tracked board. Gives by how many times.
+/// the bare chain, or of the pose of the tracked board. Returns the factor.
 fn residuals(
     ui: &Ui,
     painter: &Painter,
@@ -279,15 +279,15 @@ fn kept(ui: &Ui, key: Id) -> Option<f64> {
     ui.data(|data| data.get_temp(key))
 }
 
-/// How far neighbours in a row are apart; 0 without any.
+/// Distance of neighbours in a row; 0 without any.
 fn apart_px(corners: &[Corner]) -> f64 {
     let neighbours = corners.windows(2).filter(|pair| pair[0].index + 1 == pair[1].index);
     median_high(neighbours.map(|pair| (pair[1].px - pair[0].px).norm())).unwrap_or(0.0)
 }
 
-/// How many times as long as they are residuals of these lengths on the screen are drawn, so that nine of ten are no
-/// longer than `long`. The last factor is kept while it does about the same: in a live image it would not stand still
-/// otherwise. `None` without residuals.
+/// By which factor residuals of these lengths on the screen are exaggerated, so that nine of ten are no longer than
+/// `long`. The last factor is kept while it does about the same: it would flicker in a live image otherwise. `None`
+/// without residuals.
 fn exaggeration(lengths: impl Iterator<Item = f64>, long: f64, kept: Option<f64>) -> Option<f64> {
     let mut lengths: Vec<f64> = lengths.filter(|length| length.is_finite()).collect();
     lengths.sort_by(f64::total_cmp);
@@ -305,7 +305,7 @@ pub fn live_residuals(model: &Model, corners: &[Corner]) -> Vec<(Vector2<f64>, V
     let (Some(calibrated), Some(camera_from_target)) = (model.calibrated(), live_chain(model)) else {
         return Vec::new();
     };
-    // The pose of a tracked board is that of a flat one of the stated size.
+    // The pose of a tracked board assumes a flat one of the stated size.
     let shape = if model.track.on { BoardShape::default() } else { calibrated.shape };
     let board = calibrated.board(&model.document().meta.target);
     let residual = |corner: &Corner| {

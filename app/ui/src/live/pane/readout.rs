@@ -53,7 +53,7 @@ fn pixel_ui(ui: &mut Ui, model: &Model, shown: &Shown<'_>, point: ImagePoint, [r
     value_ui(ui, tr!(language, "Depth"), &depth);
 }
 
-/// The point in camera and base, where depth, camera and calibration say where it is.
+/// The point in camera and base, if depth, camera and calibration determine it.
 fn space_ui(ui: &mut Ui, model: &Model, shown: &Shown<'_>, point: ImagePoint) {
     const UNKNOWN: &str = "–";
     let language = model.view.language;
@@ -75,7 +75,7 @@ fn space_ui(ui: &mut Ui, model: &Model, shown: &Shown<'_>, point: ImagePoint) {
         .on_hover_text(tr!(language, "The point at this pixel in base coordinates, by the newest calibration"));
 }
 
-/// The point that is seen at a pixel in this depth; `None` without a camera, and where the lens model ends.
+/// The point seen at a pixel at this depth; `None` without a camera, and outside the lens model.
 pub fn in_camera(model: &Model, point: ImagePoint, depth_m: f32) -> Option<Point3<f64>> {
     let px = Vector2::new(f64::from(point.column), f64::from(point.row));
     let ray = model.intrinsics()?.unproject(&px).ok()?;

@@ -16,7 +16,7 @@ pub struct Shown<'a> {
     pub images: &'a Arc<FrameImages>,
     /// The capture they were recorded with; `None` for the live ones.
     pub capture: Option<CaptureId>,
-    /// Where the robot reported its tip then.
+    /// Where the robot reported its tip at that time.
     pub base_from_tip: Option<Pose<Base, Tip>>,
     /// The sensor's far plane \[m\].
     pub far_plane_m: f32,
@@ -25,7 +25,7 @@ pub struct Shown<'a> {
 }
 
 impl<'a> Shown<'a> {
-    /// Those of the model; `None` while there are none.
+    /// The images of the model; `None` while there are none.
     pub fn of(model: &'a Model, textures: &LiveTextures) -> Option<Self> {
         let far_plane_m = model.frame.as_ref().map_or(f32::INFINITY, |frame| frame.info.far_plane_m);
         if let Some(review) = &model.review {

@@ -40,7 +40,7 @@ fn reviewed(id: u32) -> Model {
     model
 }
 
-/// The newest viewport that was asked for.
+/// The newest viewport that was requested.
 fn viewport(commands: &[Command]) -> Option<Viewport> {
     commands.iter().rev().find_map(|command| match command {
         Command::Live(live::Command::SetViewport(viewport)) => Some(*viewport),
@@ -351,7 +351,7 @@ fn the_board_is_predicted_where_its_corners_are_seen() {
     assert!(behind.line(&Point3::origin(), &Point3::new(0.1, 0.0, 0.0)).is_empty());
 }
 
-/// The corners of the live image against where a pose has them: RMS \[px\].
+/// The corners of the live image compared with where a pose predicts them: RMS \[px\].
 fn apart_px(model: &Model, camera_from_target: &Pose<Camera, Target>) -> f64 {
     let (intrinsics, target) = (model.intrinsics().expect("a camera"), model.document().meta.target);
     let corners = model.detection.as_ref().and_then(|seen| seen.corners.clone()).expect("seen");
@@ -393,7 +393,7 @@ fn while_the_board_is_tracked_prediction_and_residuals_are_those_of_the_tracked_
     assert!(apart_px(&model, &at(&model).expect("tracked")) < 1.0);
     assert!(apart_px(&model, &overlays::live_chain(&model).expect("seen")) < 1.0);
 
-    // By corrected tip poses it is as far from its place in the base as the tip is, and in the image where it was.
+    // With corrected tip poses its place in the base is off by as much as the tip, and in the image it is unchanged.
     let mut corrected = model.clone();
     let arm = sample::corrected_arm();
     let tip = arm.actual(&frame.info.joints_rad).expect("six joints");

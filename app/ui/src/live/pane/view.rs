@@ -28,7 +28,7 @@ pub struct Image<'a> {
 }
 
 impl Image<'_> {
-    /// Draws it in the middle of the room; gives the pixel of the colour image under the pointer.
+    /// Draws it in the middle of the room; returns the pixel of the colour image under the pointer.
     pub fn image_ui(&self, ui: &mut Ui, outbox: &mut Outbox) -> Option<ImagePoint> {
         let texture = self.texture?;
         let room = ui.max_rect();
@@ -92,7 +92,7 @@ impl Image<'_> {
         }
     }
 
-    /// In the step that verifies, a click measures the point.
+    /// In the verification step, a click measures the point.
     fn pick(&self, response: &Response, place: &Place, outbox: &mut Outbox) {
         if self.model.step != Step::Verify || self.shown.capture.is_some() || !response.clicked() {
             return;
@@ -103,10 +103,10 @@ impl Image<'_> {
     }
 }
 
-/// Larger by a factor, with what is under the pointer staying there.
+/// Larger by a factor, with the point under the pointer staying in place.
 fn zoomed(now: Viewport, factor: f32, at: Pos2, room: Rect, place: &Place) -> Viewport {
     let zoom = (now.zoom * factor).clamp(1.0, LARGEST_ZOOM);
-    // A hair above 1 cannot be told from 1, and would make a drag pan.
+    // A zoom just above 1 looks like 1, and would make a drag pan.
     let zoom = if zoom < 1.01 { 1.0 } else { zoom };
     let size = place.image.size() * (zoom / now.zoom.clamp(1.0, LARGEST_ZOOM));
     let under = (at - place.image.min) / place.image.size();

@@ -1,4 +1,5 @@
-//! Whether the workbench may move a robot behind a driver: only after a person has said so, once for each connection.
+//! Whether the workbench may move a robot behind a driver: only after the user has allowed it, once for each
+//! connection.
 
 use egui::{Button, RichText, Ui};
 

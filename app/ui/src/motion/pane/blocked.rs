@@ -20,7 +20,7 @@ pub struct Blocked {
 }
 
 impl Blocked {
-    /// What stands in the way now.
+    /// What prevents motions now.
     pub fn of(model: &Model) -> Self {
         let language = model.view.language;
         let resting = model.resting_simulation();
@@ -42,7 +42,7 @@ impl Blocked {
         };
         let is_known = model.cell.as_ref().is_none_or(|cell| cell.arm.is_some());
         let knows_kinematics = match model.moves() {
-            // The controller has its own.
+            // The controller has kinematics of its own.
             Moves::OnceArmed { joints, tip } => tip || (joints && is_known),
             Moves::Freely | Moves::Never => is_known,
         };
@@ -55,9 +55,9 @@ impl Blocked {
         Self { arm, tip, can_start: resting.is_some() }
     }
 
-    /// The reason for everything, and what helps.
+    /// The reason for everything, and a remedy.
     pub fn arm_ui(&self, ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
-        // Where a person has to allow it, the question stands below.
+        // If the user has to allow it, the question is shown below.
         let Some(reason) = self.arm.filter(|_| model.is_armed() || !model.control.is_connected()) else { return };
         parts::notice_ui(ui, Tone::Warning, reason, |ui| {
             if self.can_start && ui.button(tr!(model.view.language, "Run the simulation")).clicked() {
@@ -66,7 +66,7 @@ impl Blocked {
         });
     }
 
-    /// The reason for motions of the tip alone.
+    /// The reason that concerns only motions of the tip.
     pub fn tip_ui(&self, ui: &mut Ui) {
         if let Some(reason) = self.tip.filter(|_| self.arm.is_none()) {
             parts::hint_ui(ui, reason);

@@ -20,7 +20,7 @@ fn id() -> Id {
     Id::new("jog that is held")
 }
 
-/// A button to be held. One that senses clicks alone is let go by egui after 0.8 s or a few points of movement, when
+/// A button to be held. One that only senses clicks is released by egui after 0.8 s or a few points of movement, when
 /// neither can be a click now.
 pub fn button(face: RichText) -> Button<'static> {
     Button::new(face).sense(Sense::click_and_drag())
@@ -34,9 +34,9 @@ impl Hold {
 
     /// A button of the pane.
     pub fn button(&mut self, ui: &Ui, response: &Response, jog: Jog) {
-        // One that has become disabled under the pointer is let go.
+        // A button that has become disabled under the pointer counts as released.
         let is_down = response.enabled() && response.is_pointer_button_down_on() && response.contains_pointer();
-        // Who comes back with the button still down has let go: a jog begins with a press only.
+        // A pointer that comes back with the button still down has released it: a jog only begins with a press.
         let begins = ui.input(|input| input.pointer.any_pressed());
         if is_down && (begins || self.before == Some(jog)) {
             self.now = Some(jog);
@@ -46,7 +46,7 @@ impl Hold {
         }
     }
 
-    /// A key of the pane. A button that is held comes first.
+    /// A key of the pane. A held button has priority.
     pub fn key(&mut self, jog: Jog) {
         self.now = self.now.or(Some(jog));
     }

@@ -1,4 +1,4 @@
-//! The joints: where each is, where it is sent, and buttons that jog it.
+//! The joints: where each is, where it is commanded to, and buttons that jog it.
 
 use egui::{Id, RichText, Shape, Slider, Stroke, Ui, WidgetInfo, WidgetType};
 use handeye_arm::{JointKind, JointValues};
@@ -14,13 +14,13 @@ use handeye_workbench::model::{Jog, Model, Motion, MotionGoal};
 use handeye_workbench::motion;
 use handeye_workbench::tr;
 
-/// What a slider covers for a joint that turns without end \[rad\], and for one that shifts without end \[m\].
+/// What a slider covers for a revolute joint without limits \[rad\], and for a prismatic one without limits \[m\].
 const ENDLESS_RAD: [f64; 2] = [-std::f64::consts::TAU, std::f64::consts::TAU];
 const ENDLESS_M: [f64; 2] = [-2.0, 2.0];
 /// A goal is shown this long \[s\] without a motion towards it: by then it was refused.
 const GOAL_SHOWN_S: f64 = 0.5;
 
-/// Where the joints are sent, while they are on their way.
+/// Where the joints are commanded to, while they are moving.
 #[derive(Debug, Clone, Copy)]
 struct Goal {
     joints: JointValues,
@@ -104,7 +104,7 @@ fn row_ui(
         let reported = numbers::fixed(here, 1, 7);
         let caption = text!("Joint {joint} is at", joint = joint).in_language(language);
         parts::value_ui(ui, &caption, &format!("{reported}{}", kind.unit()), palette.text);
-        // The goal only where it is another place.
+        // The goal, only if it differs.
         if let Some(goal) = sent.filter(|goal| (goal - here).abs() > 0.05) {
             let caption = text!("Joint {joint} goes to", joint = joint).in_language(language);
             let reported = format!("→{}{}", numbers::fixed(goal, 1, 6), kind.unit());
@@ -126,10 +126,10 @@ fn slider_ui(
     let [low, high] = shown_range(model, index);
     let here = live[index] * kind.shown_per_si();
     let mut chosen = goal.map_or(here, |goal| goal.joints[index] * kind.shown_per_si());
-    // Room for both numbers, so that a goal moves nothing.
+    // Room for both numbers, so that showing a goal does not shift the layout.
     ui.spacing_mut().slider_width = (ui.available_width() - 146.0).max(60.0);
     let slider = Slider::new(&mut chosen, low..=high).show_value(false).smart_aim(false);
-    // The place of the arm may be outside its range, and is not to be changed by being shown.
+    // The position of the arm may be outside its range, and must not be changed by being shown.
     let response = ui.add(slider.clamping(egui::SliderClamping::Edits));
     let name = match kind {
         JointKind::Revolute => text!("Goal of joint {joint} in degrees", joint = index + 1),

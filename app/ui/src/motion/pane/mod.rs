@@ -1,4 +1,4 @@
-//! Moves the arm by hand: along axes, joint by joint, or to numbers that are typed.
+//! Moves the arm by hand: along axes, joint by joint, or to typed numbers.
 
 mod allowance;
 mod blocked;
@@ -51,8 +51,8 @@ pub fn jog_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     });
 }
 
-/// What is in the way, was refused, or has to be allowed: over the lower end of the pane, so that nothing that moves the arm
-/// changes its place under the pointer. Longer words are scrolled.
+/// What blocks a motion, was refused, or has to be allowed: over the lower end of the pane, so that no control of the arm
+/// moves under the pointer. Longer texts scroll.
 fn notices_ui(ui: &mut Ui, pane: Rect, content_ui: impl FnOnce(&mut Ui)) {
     let id = ui.id().with("notices");
     let height: f32 = ui.data(|data| data.get_temp(id)).unwrap_or_default();
@@ -78,7 +78,7 @@ fn notices_ui(ui: &mut Ui, pane: Rect, content_ui: impl FnOnce(&mut Ui)) {
     }
 }
 
-/// A robot that is only read.
+/// A robot that is read-only.
 fn read_only_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     if model.cell.as_ref().is_some_and(|cell| cell.poses_are_typed) {
         typed_pose_ui(ui, model, outbox);

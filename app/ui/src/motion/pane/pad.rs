@@ -79,7 +79,7 @@ fn keys_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, hold: &mut Hold) {
     let (modifiers, down) = ui.input(|input| {
         let down = KEYS.into_iter().find_map(|(axis, backward, forward)| {
             let (backward, forward) = (input.key_down(backward), input.key_down(forward));
-            // Both at once is neither.
+            // Both at once cancel each other.
             (backward != forward).then_some((axis, forward))
         });
         (input.modifiers, down)

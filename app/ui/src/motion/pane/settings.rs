@@ -1,4 +1,4 @@
-//! How the tip is jogged: whose axes, how far, how fast.
+//! How the tip is jogged: which axes, how far, how fast.
 
 use egui::{Button, RichText, Slider, Ui, WidgetInfo, WidgetType};
 use handeye_coppeliasim::cell::{JOG_JOINT_SPEED_RAD_S, JOG_LINE_SPEED_M_S, JOG_TURN_SPEED_RAD_S};
@@ -13,7 +13,7 @@ use handeye_workbench::motion;
 use handeye_workbench::text::{Language, Text};
 use handeye_workbench::tr;
 
-/// Steps in millimetres, and in degrees for what turns: 50° at once would be a surprise.
+/// Steps in millimetres, and in degrees for rotations: 50° at once would be a surprise.
 const STEPS: [(f64, f64); 5] = [(0.1, 0.1), (1.0, 1.0), (5.0, 5.0), (10.0, 10.0), (50.0, 30.0)];
 
 /// The three rows.
@@ -92,8 +92,8 @@ fn speed_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     });
 }
 
-/// The speed as far as it is known, and what that means. A controller behind a driver is given a share of its own highest speed, which
-/// nobody has said; a speed of the tip holds for jogging along a line alone.
+/// The speed as far as it is known, and what that means. A controller behind a driver is given a share of its own highest speed,
+/// which is not known; a speed of the tip applies only to jogging along a line.
 fn speed_text(moves: Moves, share: f64) -> (Text, Text) {
     let percent = format!("{:.0}", share * 100.0);
     if matches!(moves, Moves::OnceArmed { .. }) {

@@ -1,4 +1,4 @@
-//! What the arm does now, why it did not do what was asked, and where its tip is.
+//! What the arm does now, why it did not do what was requested, and where its tip is.
 
 use egui::{Align, Button, Layout, RichText, Ui};
 
@@ -51,7 +51,7 @@ pub fn status_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     });
 }
 
-/// Why the arm did not do what it was asked for last.
+/// Why the arm did not do what was requested last.
 pub fn refusal_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     let Some(message) = model.messages.standing_in(Pane::Jog) else { return };

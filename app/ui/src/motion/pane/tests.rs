@@ -25,7 +25,7 @@ fn forward_x() -> Jog {
     Jog::Translate { frame: JogFrame::Base, axis: Axis::X, forward: true }
 }
 
-/// Presses a button and holds it for longer than any click takes, with a hand that is not quite still.
+/// Presses a button and holds it for longer than any click takes, with a hand that shakes a little.
 fn hold(pane: &mut Driven, label: &str) -> Vec<Command> {
     pane.commands();
     let at = pane.harness.get_by_label(label).rect().center();
@@ -408,7 +408,7 @@ fn what_the_arm_does_can_be_stopped_and_a_refusal_is_read() {
     assert_eq!(pane.click("Dismiss the message"), [Command::Messages(messages::Command::Dismiss(0))]);
 }
 
-/// What moves the arm, as it is called.
+/// Labels of the controls that move the arm.
 const MOVERS: [&str; 8] =
     ["Move +X", "Turn −Z", "Jog joint 1 +", "Jog joint 6 −", "Move there", "Speed in percent", "Jog with keys", "Stop"];
 

@@ -30,11 +30,11 @@ struct Typed {
     joints: JointValues,
     /// x, y, z \[mm\]; roll, pitch, yaw [°].
     tip: [f64; 6],
-    /// Whether a person has typed any of it; until then the numbers are those of the arm.
+    /// Whether the user has typed any of it; until then the numbers are those of the arm.
     is_edited: bool,
-    /// Whether the arm was sent there.
+    /// Whether the arm was commanded there.
     is_sent: bool,
-    /// Whether a person wants the errors of the arm corrected; until one has said so they are where that brings the tip nearer.
+    /// Whether the user wants the errors of the arm corrected; until one has decided, they are if that brings the tip nearer.
     corrected: Option<bool>,
     /// The cell that it is for, see [`Model::cells`].
     cell: u64,
@@ -67,12 +67,12 @@ impl Typed {
         self.tip = [mm[0], mm[1], mm[2], deg[0], deg[1], deg[2]];
     }
 
-    /// Has the numbers follow the arm, unless somebody has typed others for this arm where it is read.
+    /// Makes the numbers follow the arm, unless the user has typed others for this arm.
     fn follow(&mut self, model: &Model) {
         let robot = model.robot.as_ref();
         self.is_edited &= self.cell == model.cells && robot.is_some_and(|it| it.joints_rad.len() == self.joints.len());
         self.cell = model.cells;
-        // What was typed is done with once the arm is there.
+        // What was typed is cleared once the arm is there.
         self.is_edited &= !(self.is_sent && self.way(model).is_some_and(|way| way.is_none()));
         self.is_sent &= self.is_edited;
         if let Some(robot) = robot.filter(|_| !self.is_edited) {
@@ -80,7 +80,7 @@ impl Typed {
         }
     }
 
-    /// Where the tip really is, where moves are corrected for that.
+    /// Where the tip really is, if moves are corrected for that.
     fn real_tip(&self, model: &Model) -> Option<Pose<Base, Tip>> {
         self.is_corrected(model).then(|| real_tip(model)).flatten()
     }
@@ -157,7 +157,7 @@ pub fn typed_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
     parts::remember(ui, id, typed);
 }
 
-/// Whether the errors of the arm are corrected, where they are known.
+/// Whether the errors of the arm are corrected, if they are known.
 fn corrected_ui(ui: &mut Ui, model: &Model, typed: &mut Typed) {
     let language = model.view.language;
     let Some((plain, corrected)) = expected_mm(model).filter(|_| typed.is_tip) else { return };

@@ -9,10 +9,10 @@ use super::canvas::{Canvas, Cylinder};
 use crate::style::theme::Palette;
 use handeye_workbench::scene::PosedArm;
 
-/// Draws them; in grey where the arm is not known to be there now.
+/// Draws them; in grey if the arm is not known to be there now.
 pub fn arm(canvas: &mut Canvas, arm: &PosedArm, is_live: bool, palette: &Palette) {
     let tone = |colour, palette| if is_live { tone(colour, palette) } else { grey(palette) };
-    // The ends of tubes are inside of the housings of an arm that has some.
+    // The ends of tubes are inside the housings of an arm that has some.
     let has_housings = arm.bodies.iter().any(|(_, solid)| matches!(solid.shape, Shape::Cylinder { .. }));
     for (link, solid) in &arm.bodies {
         let base_from_shape = arm.base_from_arm * arm.links[*link] * solid.world_from_shape;
@@ -35,12 +35,12 @@ pub fn arm(canvas: &mut Canvas, arm: &PosedArm, is_live: bool, palette: &Palette
     }
 }
 
-/// Of what is not known.
+/// Colour of what is not known.
 fn grey(palette: &Palette) -> Color32 {
     palette.well.lerp_to_gamma(palette.weak, 0.35)
 }
 
-/// A body in the theme of the window: bright, dark or of a cover.
+/// A body in the theme of the window: bright, dark or a cover.
 fn tone(colour: [f32; 3], palette: &Palette) -> Color32 {
     match colour {
         props::COVER_BLUE => palette.accent,

@@ -22,11 +22,11 @@ fn size_m(target: &TargetSpec) -> f64 {
     0.6 * (third - first).norm()
 }
 
-/// The dark parts of the pattern; markers without their codes, which nobody reads at this size.
+/// The dark parts of the pattern; markers without their codes, which are unreadable at this size.
 fn dark(target: &TargetSpec) -> Vec<Vec<Point3<f64>>> {
     let grid = target.grid();
     let side = grid.square_m;
-    // One more square on each side than there are inner corners; the one between the first corners is dark.
+    // One more square on each side than inner corners; the one between the first corners is dark.
     let squares = |is_dark: &dyn Fn(usize, usize) -> bool| -> Vec<Vec<Point3<f64>>> {
         let all = (0..=grid.rows).flat_map(|row| (0..=grid.columns).map(move |column| (column, row)));
         all.filter(|(column, row)| is_dark(*column, *row))
@@ -90,12 +90,12 @@ pub fn printed(canvas: &mut Canvas, base_from_target: &Pose<Base, Target>, targe
 /// How an outline is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Line {
-    /// In one go.
+    /// Continuous.
     Solid,
     Dashed,
 }
 
-/// The outline of the pattern alone.
+/// The outline of the pattern only.
 pub fn outlined(
     canvas: &mut Canvas,
     base_from_target: &Pose<Base, Target>,

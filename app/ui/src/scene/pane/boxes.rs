@@ -1,4 +1,4 @@
-//! Boxes that the arm keeps out of: those of a person, and those that the cell says stand around.
+//! Boxes that the arm keeps out of: those of the user, and the obstacles that the cell reports.
 
 use egui::{Color32, Stroke};
 use handeye_plan::{Obstacle, WorkVolume};
@@ -11,7 +11,7 @@ use handeye_workbench::keep_out::state::KeepOut;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
-/// Corners of each face, by their numbers in [`Obstacle::corners`].
+/// Corners of each face, by their indices in [`Obstacle::corners`].
 const FACES: [[usize; 4]; 6] = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
 /// Corners that differ in one coordinate.
 const EDGES: [[usize; 2]; 12] =
@@ -19,7 +19,7 @@ const EDGES: [[usize; 2]; 12] =
 /// A shape of the scene with a longer edge \[m\] is a floor or a wall, whose box would hide the cell.
 const LONGEST_DRAWN_M: f64 = 2.5;
 
-/// Draws them, and gives their lines of the legend.
+/// Draws them, and returns their lines of the legend.
 pub fn boxes(canvas: &mut Canvas, keep_out: &KeepOut, language: Language, palette: &Palette) -> Vec<Entry> {
     let mut entries = Vec::new();
     let scene_obstacles = keep_out.scene_obstacles.iter().flat_map(|scene_obstacles| &scene_obstacles.obstacles);

@@ -13,7 +13,7 @@ use handeye_workbench::scene::frustum_end;
 pub struct Frustum<'a> {
     /// Where it is.
     pub base_from_camera: Pose<Base, Camera>,
-    /// What it sees; the bend of the lens is not drawn.
+    /// Its intrinsics; lens distortion is not drawn.
     pub intrinsics: &'a Intrinsics,
     /// How far its pyramid is drawn \[m\].
     pub length_m: f64,
@@ -27,12 +27,12 @@ impl Frustum<'_> {
         (Point3::from(self.base_from_camera.translation()), corners)
     }
 
-    /// A point in its middle, for pointing at it.
+    /// A point in its middle, where the pointer picks it.
     pub fn middle(&self) -> Point3<f64> {
         self.base_from_camera.isometry() * Point3::new(0.0, 0.0, 0.6 * self.length_m)
     }
 
-    /// Draws the pyramid, and over the top edge of the image a small roof that tells up from down.
+    /// Draws the pyramid, and over the top edge of the image a small roof that marks the top.
     pub fn draw(&self, canvas: &mut Canvas, width: f32, edge: Color32, fill: Color32) {
         let (apex, corners) = self.points();
         let stroke = Stroke::new(width, edge);

@@ -6,11 +6,11 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::eye::{Eye, ScreenPoint};
 
-/// Sides of what is round.
+/// Number of sides of round shapes.
 const SIDES: usize = 20;
-/// What a face that is turned away from the light keeps of its colour.
+/// Share of its colour that a face keeps when it is turned away from the light.
 const SHADOW: f32 = 0.45;
-/// Where the light comes from, by the axes of the eye: from the left, above and behind it.
+/// Direction of the light in the axes of the eye: from the left, above and behind it.
 const LIGHT: [f64; 3] = [-0.42, 0.62, -0.66];
 
 /// Something with the distance by which it is sorted.
@@ -19,7 +19,7 @@ struct Item {
     shape: Shape,
 }
 
-/// Words beside a point.
+/// Words next to a point.
 struct Words {
     at: Pos2,
     text: String,
@@ -30,7 +30,7 @@ struct Words {
 pub struct Canvas {
     /// From where it is seen.
     pub eye: Eye,
-    /// Colour of what lies in shadow.
+    /// Colour of what is in shadow.
     shadow: Color32,
     ground: Vec<Shape>,
     items: Vec<Item>,
@@ -49,7 +49,7 @@ pub struct Cylinder {
 }
 
 impl Canvas {
-    /// Nothing yet. What lies in shadow fades to a colour.
+    /// Nothing yet. What is in shadow fades to a colour.
     pub fn new(eye: Eye, shadow: Color32) -> Self {
         let light = eye.axes().iter().zip(LIGHT).map(|(axis, part)| axis * part).sum::<Vector3<f64>>().normalize();
         Self { eye, shadow, ground: Vec::new(), items: Vec::new(), words: Vec::new(), light }
@@ -73,7 +73,7 @@ impl Canvas {
         }
     }
 
-    /// A straight line on a face of about this size \[m\], which does not hide it; in dashes if wanted.
+    /// A straight line on a face of about this size \[m\], which does not hide it; dashed if wanted.
     pub fn line_on_face(&mut self, ends: [Point3<f64>; 2], stroke: Stroke, dashed: bool, size_m: f64) {
         if let Some(ends) = self.eye.segment(ends) {
             let points = ends.map(|end| end.at);
@@ -126,7 +126,7 @@ impl Canvas {
         }
     }
 
-    /// Words over everything, beside a point.
+    /// Words over everything, next to a point.
     pub fn words(&mut self, point: &Point3<f64>, text: impl Into<String>, colour: Color32) {
         if let Some(seen) = self.eye.point(point) {
             self.words.push(Words { at: seen.at, text: text.into(), colour });
@@ -139,7 +139,7 @@ impl Canvas {
         self.shadow.lerp_to_gamma(colour, SHADOW + (1.0 - SHADOW) * light)
     }
 
-    /// A round body, left out while a part of it is behind the eye.
+    /// A round body, not drawn while a part of it is behind the eye.
     pub fn cylinder(&mut self, body: &Cylinder, colour: Color32) {
         let [from, to] = body.ends;
         let Some(axis) = (to - from).try_normalize(1e-9) else { return };
@@ -174,7 +174,7 @@ impl Canvas {
                 }
             }
         }
-        // Half of it at most can be seen of a body, and its outline hides the steps at the edge of a mesh.
+        // At most half of a body is visible, and its outline hides the steps at the edge of a mesh.
         let outline = convex_hull(first.into_iter().chain(second).collect());
         let edge = Stroke::new(1.2, self.shadow.lerp_to_gamma(colour, 0.42));
         let middle = nalgebra::center(&from, &to);
@@ -182,7 +182,7 @@ impl Canvas {
         self.push(depth_m, Shape::Vec(vec![Shape::mesh(mesh), Shape::closed_line(outline, edge)]));
     }
 
-    /// The round end of a body, left out behind the eye.
+    /// The round end of a body, not drawn behind the eye.
     pub fn ball(&mut self, middle: &Point3<f64>, radius_m: f64, colour: Color32) {
         let [right, up, forward] = self.eye.axes();
         let Some(seen) = self.eye.point(middle) else { return };
@@ -198,7 +198,7 @@ impl Canvas {
         self.push((middle - self.eye.at()).norm(), Shape::mesh(mesh));
     }
 
-    /// Draws all of it.
+    /// Draws everything.
     pub fn paint(mut self, painter: &Painter) {
         painter.extend(self.ground);
         self.items.sort_by(|a, b| b.depth_m.total_cmp(&a.depth_m));

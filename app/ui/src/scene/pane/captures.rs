@@ -13,7 +13,7 @@ use crate::style::theme::Palette;
 use handeye_workbench::model::Model;
 use handeye_workbench::scene::{BAD_AT_MEDIANS, BoardItem, CaptureItem, CaptureUse, Captures, Fixed, Known};
 
-/// Length of a frustum [m]: many of them have to stand beside each other.
+/// Length of a frustum [m]: many of them have to fit next to each other.
 const LENGTH_M: f64 = 0.06;
 /// Where a capture is on the screen, to point at it.
 #[derive(Debug, Clone, Copy)]
@@ -25,8 +25,9 @@ pub struct Spot {
     pub taken_m: Point3<f64>,
 }
 
-/// The colour of a capture: by what it is for, and the nearer to that of a warning the larger its residual is against
-/// the median; in it above the line between good and bad residuals, and when the estimate set it aside, as in the charts.
+/// The colour of a capture: by its purpose, and the nearer to the warning colour the larger its residual is relative to
+/// the median; in the warning colour above the line between good and bad residuals, and if the estimate excluded it, as
+/// in the charts.
 fn colour(item: &CaptureItem, line_px: Option<f64>, marks: &Marks, warning: Color32) -> Color32 {
     match item.used_as {
         CaptureUse::Rejected => warning,
@@ -40,7 +41,7 @@ fn colour(item: &CaptureItem, line_px: Option<f64>, marks: &Marks, warning: Colo
     }
 }
 
-/// Draws all of them and gives where they are on the screen.
+/// Draws all of them and returns where they are on the screen.
 pub fn captures(
     canvas: &mut Canvas,
     model: &Model,
@@ -51,7 +52,7 @@ pub fn captures(
 ) -> Vec<Spot> {
     let items = Captures::new(known);
     let mut spots = Vec::new();
-    // Without a robot nothing says where the camera was.
+    // Without a robot it is not known where the camera was.
     let taken = model.document().captures.iter().filter_map(|record| Some((record, record.base_from_tip?)));
     for (record, base_from_tip) in taken.filter(|(_, base_from_tip)| base_from_tip.is_finite()) {
         let item = items.item(record);
@@ -76,7 +77,7 @@ struct Place {
     taken_m: Point3<f64>,
 }
 
-/// Draws one; a camera that stands still has the boards instead, and a camera that is not known the tip.
+/// Draws one; a camera that is fixed has the boards instead, and a camera that is not known the tip.
 fn capture(
     canvas: &mut Canvas,
     known: &Known,

@@ -1,4 +1,4 @@
-//! What there is to see in the cell, and what of it is known how.
+//! What there is to see in the cell, and how it is known.
 
 use egui::{Color32, Stroke, Ui};
 use handeye_geometry::frames::Pose;
@@ -35,13 +35,13 @@ pub fn is_empty(model: &Model) -> bool {
 
 /// What was drawn.
 pub struct Drawn {
-    /// What its lines mean.
+    /// The meaning of its lines.
     pub entries: Vec<Entry>,
     /// The captures.
     pub spots: Vec<Spot>,
 }
 
-/// Draws all of it.
+/// Draws everything.
 pub fn draw(canvas: &mut Canvas, ui: &Ui, model: &Model, table: &CaptureTable, pointed: Option<CaptureId>) -> Drawn {
     let (palette, marks, language) = (Palette::of(ui), Marks::of(ui), model.view.language);
     ground::ground(canvas, palette, marks.axes);
@@ -126,7 +126,7 @@ fn grid_entry(palette: &Palette, language: Language) -> Entry {
 }
 
 fn live_camera(canvas: &mut Canvas, known: &Known, language: Language, colour: Color32, entries: &mut Vec<Entry>) {
-    // A camera that stands still is known without the robot.
+    // A fixed camera is known without the robot.
     let Some(CameraItem { role, place, shape: Some(intrinsics) }) = known.camera() else { return };
     let Some(base_from_camera) = place.in_base(known.base_from_tip.as_ref()).filter(Pose::is_finite) else { return };
     let frustum = Frustum { base_from_camera, intrinsics: &intrinsics, length_m: CAMERA_LENGTH_M };
@@ -152,7 +152,7 @@ fn boards(
     (palette, marks): (&Palette, &Marks),
     entries: &mut Vec<Entry>,
 ) {
-    // Of a board that is tracked the pattern is there.
+    // The pattern of a tracked board is already drawn.
     let mut has_pattern = false;
     for BoardItem { role, place, shape } in known.boards() {
         let Some(target) = &shape else { continue };
@@ -186,7 +186,7 @@ fn boards(
     }
 }
 
-/// The path of the tip, fainter the longer ago it went there.
+/// The path of the tip, fainter the older it is.
 fn trail(canvas: &mut Canvas, model: &Model, palette: &Palette, entries: &mut Vec<Entry>) {
     let points: Vec<Point3<f64>> = model.trail.points_m().map(Point3::from).collect();
     let colour: Color32 = palette.warning;

@@ -1,4 +1,4 @@
-//! The eye of the 3D pane: where it is, how points come onto the screen, and how it is moved.
+//! The eye of the 3D pane: where it is, how points are projected onto the screen, and how it is moved.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -8,13 +8,13 @@ use nalgebra::{Point3, Vector3};
 use handeye_workbench::model::SceneView;
 use handeye_workbench::scene::OPENING_RAD;
 
-/// What is nearer to the eye than this is cut off \[m\].
+/// Near clipping distance of the eye \[m\].
 const NEAR_M: f64 = 0.02;
-/// The eye comes no nearer to the middle than this, and goes no farther \[m\].
+/// Limits of the distance of the eye from the centre \[m\].
 const DISTANCES_M: [f64; 2] = [0.08, 12.0];
-/// The middle leaves the base by at most this \[m\], so that the cell can be found again.
+/// The centre is at most this far from the base \[m\], so that the cell can be found again.
 const FARTHEST_CENTRE_M: f64 = 5.0;
-/// Turn per point of a drag [rad]: across a pane of usual size it is half a turn.
+/// Turn per point of a drag [rad]: half a turn across a pane of usual size.
 const RAD_PER_POINT: f64 = 0.008;
 
 /// The eye over a room on the screen. Coordinates are the base's, in metres; the eye's own axes are x to the right,
@@ -115,7 +115,7 @@ impl Eye {
         seen
     }
 
-    /// What of the ground, the plane z = 0, is behind a point on the screen; `None` over the horizon.
+    /// The point of the ground, the plane z = 0, behind a point on the screen; `None` above the horizon.
     pub fn on_ground(&self, at: Pos2) -> Option<Point3<f64>> {
         let offset = at - self.middle;
         let sight = self.forward * self.focal + self.right * f64::from(offset.x) - self.up * f64::from(offset.y);
@@ -129,12 +129,12 @@ impl Eye {
     }
 }
 
-/// Where a line comes in front of the eye.
+/// Where a line crosses the near plane of the eye.
 fn crossing([from, to]: [Point3<f64>; 2], [near, far]: [f64; 2]) -> Point3<f64> {
     from + (to - from) * ((NEAR_M - near) / (far - near))
 }
 
-/// Straight views of the cell.
+/// Axis-aligned views of the cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
     /// From above: x of the base to the right, y up.
@@ -149,7 +149,7 @@ impl Side {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Top, Self::Front, Self::Right];
 
-    /// The view from there, of the same point and from as far.
+    /// The view from there, of the same point and from the same distance.
     #[must_use]
     pub fn view(self, now: SceneView) -> SceneView {
         let (azimuth_rad, elevation_rad) = match self {
@@ -180,7 +180,7 @@ pub fn panned(now: SceneView, drag: Vec2, room: Rect) -> SceneView {
     SceneView { centre_m, ..now }
 }
 
-/// The view from nearer by a factor, or from farther when it is under 1.
+/// The view from nearer by a factor, or from farther if it is below 1.
 #[must_use]
 pub fn zoomed(now: SceneView, factor: f64) -> SceneView {
     let [nearest, farthest] = DISTANCES_M;

@@ -8,9 +8,9 @@ use crate::style::theme::Palette;
 
 /// Distance of the lines \[mm\].
 pub const SPACING_MM: i32 = 100;
-/// So many lines at each side of the middle.
+/// Number of lines at each side of the centre.
 const LINES: i32 = 10;
-/// Every so many lines one is stronger.
+/// Every this many lines one is stronger.
 const MAJOR: i32 = 5;
 /// Length of the axes \[m\].
 const AXES_M: f64 = 0.3;

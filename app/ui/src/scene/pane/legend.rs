@@ -36,7 +36,7 @@ pub struct Entry {
     pub what: String,
 }
 
-/// The legend at the lower left of a room; nothing where the room is too small for it.
+/// The legend at the lower left of a room; nothing if the room is too small for it.
 pub fn legend_ui(ui: &mut Ui, room: Rect, entries: &[Entry]) {
     let height = ROW * entries.len() as f32;
     if room.height() < height + 90.0 || room.width() < 240.0 {

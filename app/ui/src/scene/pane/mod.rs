@@ -1,7 +1,7 @@
-//! Arm, cameras and board in three dimensions, for a look without a viewer of its own.
+//! Arm, cameras and board in three dimensions, for a look without a separate viewer.
 //!
-//! The pane is drawn with the painter of the window, from back to front: `eye` brings points onto the screen, `canvas`
-//! sorts what is drawn, and each of the other files draws one kind of thing.
+//! The pane is drawn with the painter of the window, from back to front: `eye` projects points onto the screen,
+//! `canvas` sorts what is drawn, and each of the other files draws one kind of thing.
 
 mod arm;
 mod board;
@@ -72,7 +72,7 @@ pub fn scene_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     ui.scope_builder(row, |ui| header_ui(ui, model, outbox));
 }
 
-/// The view of all there is.
+/// The view of everything.
 fn first_view(model: &Model) -> SceneView {
     fitted_view(model).unwrap_or_default()
 }
@@ -101,7 +101,7 @@ fn header_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
         let font = FontId::proportional(theme::CAPTION);
         let hint = ui.painter().layout_no_wrap(hint.to_owned(), font, Palette::of(ui).weak);
-        // Half of it says nothing.
+        // A truncated hint is not useful.
         if hint.size().x <= ui.available_width() {
             ui.add(egui::Label::new(hint));
         }
@@ -169,7 +169,7 @@ fn draw_box(ui: &Ui, response: &Response, canvas: &mut Canvas, model: &Model, ou
     }
 }
 
-/// What the pointer does to captures; gives the one that it is over.
+/// Pointer interaction with captures; returns the one that it is over.
 fn spots_ui(
     ui: &mut Ui,
     room: Rect,

@@ -13,12 +13,12 @@ use handeye_workbench::scene::{Known, PlannedItem};
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
-/// Length of a frustum [m]: that of a capture, which it becomes.
+/// Length of a frustum [m]: as for a capture, which it becomes.
 const LENGTH_M: f64 = 0.06;
 /// How strong the poses after the next one are.
 const LATER: f32 = 0.45;
 
-/// Draws them, the next one strongest, and gives their line of the legend.
+/// Draws them, the next one strongest, and returns their line of the legend.
 pub fn planned(
     canvas: &mut Canvas,
     model: &Model,

@@ -204,7 +204,7 @@ fn a_box_to_keep_out_of_is_drawn_on_the_ground_named_and_deleted() {
     assert!(matches!(drags[..], [Command::Scene(scene::Command::SetView(_))]), "one box is one drag: {drags:?}");
 }
 
-/// A file may say more than a field shows.
+/// A file may contain more than a field shows.
 #[test]
 fn looking_at_the_boxes_of_a_file_changes_nothing_of_them() {
     let mut model = sample::connected();

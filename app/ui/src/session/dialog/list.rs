@@ -16,7 +16,7 @@ use handeye_workbench::tr;
 
 /// Height of the list before it scrolls.
 const HEIGHT: f32 = 220.0;
-/// Sessions of before that are shown.
+/// Number of earlier sessions that are shown.
 const MOST_RECENT: usize = 4;
 
 /// Sessions that were open before.

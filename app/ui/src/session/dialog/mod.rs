@@ -1,4 +1,4 @@
-//! Choosing a folder or a file. What is in a folder is read elsewhere and shown when it is there.
+//! Choosing a folder or a file. What is in a folder is read on another thread and shown when it is available.
 
 mod list;
 mod purpose;
@@ -21,16 +21,16 @@ use purpose::Purpose;
 #[derive(Debug, Clone, Default)]
 struct State {
     dialog: Option<Dialog>,
-    /// The path that is acted on.
+    /// The path to act on.
     typed: String,
     /// The entry that the arrow keys have reached.
     selected: Option<usize>,
-    /// The path is that of a session of before, which was clicked.
+    /// The path is that of an earlier session, which was clicked.
     is_chosen: bool,
     asked: Option<Asked>,
 }
 
-/// A session was asked for; the dialog stays until it is there.
+/// A session was requested; the dialog stays until it is open.
 #[derive(Debug, Clone, Copy)]
 struct Asked {
     /// The newest message before.
@@ -43,7 +43,7 @@ fn id() -> Id {
     Id::new("dialog of folders")
 }
 
-/// Nothing of a dialog outlives it.
+/// Clears the state of the dialogs.
 pub fn forget(ctx: &Context) {
     ctx.data_mut(|data| data.remove::<State>(id()));
 }
@@ -72,7 +72,7 @@ pub fn folders_ui(ui: &mut Ui, model: &Model, dialog: Dialog, outbox: &mut Outbo
     parts::remember(ui, id(), state);
 }
 
-/// Arrows choose an entry, Enter acts. Taken before the field for the path, which would keep them.
+/// Arrows choose an entry, Enter acts. Handled before the field for the path, which would consume them.
 fn keys(ui: &mut Ui, model: &Model, purpose: &Purpose, state: &mut State, outbox: &mut Outbox) {
     let shown = list::shown(model, purpose);
     let pressed = |ui: &mut Ui, key| ui.input_mut(|input| input.consume_key(Modifiers::NONE, key));
@@ -106,7 +106,7 @@ fn current(model: &Model) -> PathBuf {
     model.folder.as_ref().map_or_else(|| purpose::first_folder(model), |listing| listing.folder.clone())
 }
 
-/// What a double click does: goes into a folder, or takes what was looked for.
+/// What a double click does: enters a folder, or takes the selected entry.
 fn activate(model: &Model, purpose: &Purpose, state: &mut State, entry: &FolderEntry, outbox: &mut Outbox) {
     let path = current(model).join(&entry.name);
     let is_goal = match entry.kind {
@@ -129,7 +129,7 @@ fn go(purpose: &Purpose, state: &mut State, folder: PathBuf, outbox: &mut Outbox
     outbox.send(session::Command::ListFolder(folder));
 }
 
-/// Does what the dialog is for.
+/// Performs the dialog's action.
 fn act(model: &Model, purpose: &Purpose, state: &mut State, outbox: &mut Outbox) {
     let Some(command) = purpose.command(state.typed.trim()) else { return };
     outbox.send(command);
@@ -140,11 +140,11 @@ fn act(model: &Model, purpose: &Purpose, state: &mut State, outbox: &mut Outbox)
     }
 }
 
-/// Closes the dialog when the session is there, and keeps it when it is not.
+/// Closes the dialog when the session is open, and keeps it when it is not.
 fn follow(model: &Model, state: &mut State, outbox: &mut Outbox) {
     let Some(asked) = &mut state.asked else { return };
     asked.frames += 1;
-    // The command is applied after the frame in which it is asked for.
+    // The command is applied after the frame in which it is requested.
     if asked.frames < 3 || model.opening {
         return;
     }
@@ -154,7 +154,7 @@ fn follow(model: &Model, state: &mut State, outbox: &mut Outbox) {
     }
 }
 
-/// Why the session that was asked for is not there.
+/// Why the requested session is not open.
 fn trouble(model: &Model, state: &State) -> Option<String> {
     let asked = state.asked.as_ref()?;
     let message = model.messages.iter().rev().find(|message| message.severity == Severity::Error)?;
@@ -174,7 +174,7 @@ fn path_ui(ui: &mut Ui, model: &Model, purpose: &Purpose, state: &mut State, is_
         response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, tr!(language, "Path")));
         if is_new {
             response.request_focus();
-            // Behind the last letter: a path is gone on with, or its last part replaced.
+            // After the last letter: a path is usually continued, or its last part replaced.
             let end = CCursorRange::one(CCursor::new(state.typed.chars().count()));
             shown.state.cursor.set_char_range(Some(end));
             shown.state.store(ui.ctx(), response.id);

@@ -1,4 +1,4 @@
-//! What each dialog is for: its words, where it begins, and what comes of it.
+//! The purpose of each dialog: its words, its start folder, and its result.
 
 use std::path::{Path, PathBuf};
 
@@ -19,9 +19,9 @@ pub struct Purpose {
     pub title: &'static str,
     /// What to do.
     pub hint: &'static str,
-    /// What its button says.
+    /// Label of its button.
     pub action: &'static str,
-    /// What the empty field says.
+    /// Hint of the empty field.
     pub empty_hint: &'static str,
 }
 
@@ -101,12 +101,12 @@ impl Purpose {
         matches!(self.dialog, Dialog::ImportPoses | Dialog::ExportPoses | Dialog::ImportKeepOut | Dialog::ExportKeepOut)
     }
 
-    /// Whether the dialog stays until it is known how it went.
+    /// Whether the dialog stays until its outcome is known.
     pub fn is_awaited(&self) -> bool {
         matches!(self.dialog, Dialog::Open | Dialog::SaveAs | Dialog::New)
     }
 
-    /// What the path is at first.
+    /// The initial path.
     pub fn first_path(&self, model: &Model) -> String {
         let folder = first_folder(model);
         match &self.dialog {
@@ -135,7 +135,7 @@ impl Purpose {
         }
     }
 
-    /// What comes of a path; `None` when it is not enough.
+    /// The command for a path; `None` if the path is not sufficient.
     pub fn command(&self, typed: &str) -> Option<Command> {
         let path = PathBuf::from(typed);
         if typed.is_empty() {
@@ -163,7 +163,7 @@ impl Purpose {
     }
 }
 
-/// Where to look first: where one looked last, or beside the session that is open or was.
+/// Where to look first: the folder that was shown last, or the one with the session that is or was open.
 pub fn first_folder(model: &Model) -> PathBuf {
     let listed = model.folder.as_ref().map(|listing| listing.folder.clone());
     let session = model.session.folder.as_deref().or(model.recent.first().map(|recent| recent.folder.as_path()));

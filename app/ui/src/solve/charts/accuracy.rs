@@ -20,7 +20,7 @@ pub fn accuracy_ui(ui: &mut Ui, model: &Model) {
     let language = model.view.language;
     let calibration = model.solve.solved.as_ref().map(|solved| &solved.calibration);
     if calibration.is_some_and(|calibration| *calibration.stated_uncertainty() != StatedUncertainty::AsModelled) {
-        // The curve is that of the noise alone.
+        // The curve only covers the noise.
         instead_ui(ui, tr!(language, "More poses do not help until what was found is corrected"));
         return;
     }
@@ -29,7 +29,7 @@ pub fn accuracy_ui(ui: &mut Ui, model: &Model) {
         instead_ui(ui, tr!(language, "The expected error appears with the first joint calibration"));
         return;
     };
-    // Where a tool is known the goal is asked of it. By the errors of an arm poses are planned for it, too.
+    // If a tool is known the goal applies to it. Poses are then planned for it with the errors of the arm, too.
     let promised = model.solve.solved.as_ref().and_then(|solved| solved.promised(model.view.goal.0));
     let is_of_point = promised.is_none_or(|promised| promised.of == Promise::Point);
     let are_for_point = is_of_point || promised.is_some_and(|promised| promised.of == Promise::ReachByAccuracy);
@@ -43,7 +43,7 @@ pub fn accuracy_ui(ui: &mut Ui, model: &Model) {
     chart.hover_ui(ui, curve, language);
 }
 
-/// Where we are and what the goal takes, where it is asked of this error.
+/// The present value and what the goal needs, if the goal applies to this error.
 pub fn verdict(curve: &ErrorCurve, (views, error_m): (usize, f64), goal_mm: Option<f64>) -> Text {
     let error = numbers::error_mm(error_m);
     let Some(goal_mm) = goal_mm else {
@@ -86,7 +86,7 @@ struct Chart {
 
 /// What guided capture expects of the poses that it has planned: numbers of poses and errors [mm].
 fn planned(model: &Model, (views, error_m): (usize, f64)) -> Vec<(usize, f64)> {
-    // A check is not for the fit, and of a first turn nobody knows what it gives.
+    // A check is not for the fit, and what a first turn contributes is not known.
     let is_fit = model.sequence.as_ref().is_some_and(|sequence| sequence.purpose == Some(CapturePurpose::Calibrate));
     let chosen = model.planned_poses().iter().enumerate().filter(|(_, pose)| is_fit && pose.error_ratio < 1.0);
     chosen.map(|(index, pose)| (views + index + 1, error_m * 1e3 * pose.error_ratio)).collect()

@@ -109,7 +109,7 @@ impl Scale {
     }
 }
 
-/// A little more than the largest value, or 1 where there is none.
+/// A little more than the largest value, or 1 if there is none.
 fn beyond(largest: f64) -> f64 {
     if largest.is_finite() && largest > 0.0 { largest * 1.12 } else { 1.12 }
 }
@@ -123,7 +123,7 @@ fn round_step(least: f64) -> f64 {
     [1.0, 2.0, 5.0, 10.0].into_iter().map(|digit| digit * power).find(|step| *step >= least * 0.999).unwrap_or(power)
 }
 
-/// A number on an axis, without zeros that say nothing.
+/// A number on an axis, without trailing zeros.
 pub fn short(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -139,7 +139,7 @@ pub fn plot_rect(room: Rect) -> Rect {
     Rect::from_min_max(min, (room.max - egui::vec2(RIGHT, BOTTOM)).max(min + egui::vec2(1.0, 1.0)))
 }
 
-/// The room beside the name of the horizontal axis.
+/// The room next to the name of the horizontal axis.
 pub fn beside_name(plot: Rect) -> Rect {
     let bottom = plot.bottom() + BOTTOM;
     Rect::from_x_y_ranges(plot.x_range(), bottom - CAPTION - 4.0..=bottom)
@@ -150,7 +150,7 @@ pub fn y(plot: Rect, scale: Scale, value: f64) -> f32 {
     plot.bottom() - (scale.part(value).clamp(-0.01, 1.02) as f32) * plot.height()
 }
 
-/// Lines, numbers and names. `x_ticks` are places on the screen with what stands there.
+/// Lines, numbers and names. `x_ticks` are places on the screen with their labels.
 pub fn axes_ui(ui: &Ui, plot: Rect, scale: Scale, y_name: &str, x_name: &str, x_ticks: &[(f32, String)]) {
     let palette = Palette::of(ui);
     let painter = ui.painter();

@@ -17,13 +17,13 @@ use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 use handeye_workbench::{session, solve};
 
-/// The line is first drawn at so many times the median residual.
+/// The line is first drawn at this multiple of the median residual.
 const FIRST_LINE: f64 = 2.0;
 /// Room for the line of controls.
 const CONTROLS: f32 = 30.0;
-/// The line is grasped this near.
+/// Distance within which the line can be grabbed.
 const GRASP: f32 = 5.0;
-/// Bars that are much wider than others are high look like blocks.
+/// Bars that are much wider than high look like blocks.
 const WIDEST: f32 = 46.0;
 
 /// Residuals, with the line.
@@ -106,7 +106,7 @@ fn controls_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Ou
     });
 }
 
-/// What is drawn of every capture.
+/// What is drawn for every capture.
 struct Bars {
     name: &'static str,
     y_name: &'static str,

@@ -16,7 +16,7 @@ use handeye_workbench::model::Model;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
-/// With so much room all charts are shown at once.
+/// With this much room all charts are shown at once.
 const ROOM_FOR_ALL: Vec2 = Vec2::new(860.0, 520.0);
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -73,7 +73,7 @@ fn a_click_on_a_bar_selects_its_capture() {
     let pitch = (plot.width() / 12.0).min(46.0);
     let at = plot.left_bottom() + vec2(pitch * 4.5, -4.0);
     pane.harness.hover_at(at);
-    // Words at the pointer take half a second.
+    // Tooltips appear after half a second.
     pane.harness.run_steps(60);
     assert!(pane.sees("Capture 5 · pose 5"));
     pane.harness.drag_at(at);
@@ -88,7 +88,7 @@ fn the_bar_of_a_capture_that_was_set_aside_says_so() {
     let plot = pane.rect("RMS residual [px]");
     let pitch = (plot.width() / 12.0).min(46.0);
     pane.harness.hover_at(plot.left_bottom() + vec2(pitch * 2.5, -4.0));
-    // Words at the pointer take half a second.
+    // Tooltips appear after half a second.
     pane.harness.run_steps(60);
     assert!(pane.sees("Capture 3 · pose 3") && pane.sees("outlier"));
 }

@@ -1,4 +1,4 @@
-//! Where the camera is, how far off that may be, and how far off it is where the truth is known.
+//! Where the camera is, how large its error may be, and its true error if the truth is known.
 
 use egui::{RichText, Ui};
 use handeye_estimate::handeye::Mode;
@@ -45,7 +45,7 @@ pub fn answer_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     });
     parts::hint_ui(ui, meaning);
     let law = solved.calibration.joint.as_ref().map_or(SmallSample::KNOWN, |joint| joint.small_sample);
-    // With something found that is not in the model the covariance is no error of the answer.
+    // If something was found that is not in the model the covariance is not the error of the answer.
     let covariance = solved.calibration.link_covariances().map(|links| links.hand_eye);
     let covariance_withheld =
         covariance.is_some() && *solved.calibration.stated_uncertainty() != StatedUncertainty::AsModelled;

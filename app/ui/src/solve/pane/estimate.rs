@@ -1,4 +1,4 @@
-//! What the estimate decided and found out besides the answer.
+//! What the estimate decided and found in addition to the answer.
 
 use egui::Ui;
 
@@ -6,7 +6,7 @@ use crate::style::parts;
 use handeye_workbench::model::{self, Model, Solved};
 use handeye_workbench::tr;
 
-/// A line each; nothing for what is as usual.
+/// One line each; nothing for what is as usual.
 pub fn estimate_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     let language = model.view.language;
     let lines = model::estimated(&solved.calibration, solved.depth.as_ref());

@@ -20,7 +20,7 @@ fn stated(evidence: &Evidence, language: Language) -> String {
     format!("{} {value}{gap}{unit}", called(name, language))
 }
 
-/// The name in words; those of closed forms stay.
+/// The name in words; those of closed forms are kept.
 fn called(name: &'static str, language: Language) -> &'static str {
     match name {
         "views" => tr!(language, "views"),

@@ -13,18 +13,18 @@ use handeye_workbench::model::{Model, Solved};
 /// 95 % quantile of chi-square with six degrees of freedom.
 const CHI_SQUARE_6_95: f64 = 12.592;
 
-/// What 95 % of the errors stay within, for every axis on its own.
+/// The bound of 95 % of the errors, for every axis separately.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Within95 {
-    /// Of the translation, along the axes of the parent \[m\].
+    /// The bound of the translation, along the axes of the parent \[m\].
     pub translation_m: [f64; 3],
-    /// Of the rotation, about the axes of the child \[rad\].
+    /// The bound of the rotation, about the axes of the child \[rad\].
     pub rotation_rad: [f64; 3],
 }
 
 impl Within95 {
     /// From the covariance of `[t; r]` in `T * exp(delta)`, whose translation is along the axes of the child, and the
-    /// distribution of the error, as the headline has it: few views know their noise levels badly.
+    /// distribution of the error, as in the headline: with few views the noise levels are poorly known.
     pub fn new(mount_from_camera: &Pose<Mount, Camera>, covariance: &Matrix6<f64>, law: SmallSample) -> Self {
         let rotation = mount_from_camera.rotation().to_rotation_matrix().into_inner();
         let translation = rotation * covariance.fixed_view::<3, 3>(0, 0) * rotation.transpose();
@@ -39,16 +39,16 @@ impl Within95 {
     }
 }
 
-/// An answer against where the camera really is.
+/// An answer compared with the true place of the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AgainstTruth {
-    /// By how much a point is off where the board was seen \[m\].
+    /// The error of a point where the board was seen \[m\].
     pub at_board_m: Option<f64>,
     /// Whether the whole transform is within its stated 95 %; `None` when it states none.
     pub is_within: Option<bool>,
 }
 
-/// Compares with the truth; `None` where it is not known.
+/// Compares with the truth; `None` if it is not known.
 pub fn against_truth(model: &Model, solved: &Solved) -> Option<AgainstTruth> {
     let hand_eye = solved.calibration.hand_eye?;
     let truth = true_mount_from_camera(model, hand_eye.mode())?;
@@ -69,7 +69,7 @@ pub fn against_truth(model: &Model, solved: &Solved) -> Option<AgainstTruth> {
     Some(AgainstTruth { at_board_m, is_within })
 }
 
-/// That of the session, which may be of another cell than the one that is connected.
+/// The truth of the session, which may be of another cell than the connected one.
 fn true_mount_from_camera(model: &Model, mode: Mode) -> Option<Pose<Mount, Camera>> {
     let recorded = model.document().meta.ground_truth.as_ref().and_then(|truth| truth.links(mode));
     if let Some(links) = recorded {

@@ -1,4 +1,4 @@
-//! What is weak, by which evidence, and what to do next.
+//! What is weak, the evidence, and what to do next.
 
 use egui::{Label, RichText, Ui};
 use handeye_estimate::diagnose::findings::{Finding, Severity};

@@ -1,4 +1,5 @@
-//! The numbers that matter: the expected error where the tool works, against the goal, and how near a tool arrives by this arm.
+//! The numbers that matter: the expected error where the tool works, compared with the goal, and how near a tool gets with this
+//! arm.
 
 use handeye_estimate::diagnose::{Promise, Promised};
 use handeye_estimate::reach_error::USUAL_TOOL_M;
@@ -80,7 +81,7 @@ fn verdict_ui(ui: &mut Ui, model: &Model, solved: &Solved, promised: &Promised, 
     }
 }
 
-/// The expected error of a measured point, where nothing is known of a tool.
+/// The expected error of a measured point, if nothing is known about a tool.
 fn expected_error_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Outbox) {
     let language = model.view.language;
     let palette = Palette::of(ui);
@@ -124,7 +125,7 @@ fn meaning_of_point(language: Language) -> &'static str {
     )
 }
 
-/// What the findings would move of an error.
+/// By how much the findings would change an error.
 fn moved_ui(ui: &mut Ui, model: &Model, solved: &Solved, error_mm: Option<f64>) {
     let moved_mm = solved.result.estimate.as_ref().and_then(|estimate| estimate.moved_mm);
     if let Some((error_mm, moved_mm)) = error_mm.zip(moved_mm) {
@@ -139,7 +140,7 @@ fn moved_ui(ui: &mut Ui, model: &Model, solved: &Solved, error_mm: Option<f64>) 
     }
 }
 
-/// The same under what a tool arrives within: the part of the calibration alone.
+/// The same below the bound for a tool: the part of the calibration alone.
 fn error_of_a_point_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     let language = model.view.language;
     let Some(error_mm) = solved.result.quality.tip_error_95_mm else { return };
@@ -150,7 +151,7 @@ fn error_of_a_point_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     moved_ui(ui, model, solved, Some(error_mm));
 }
 
-/// How near a tool arrives, which is what people calibrate for; whether that is known.
+/// How near a tool gets, which is the purpose of the calibration; whether that is known.
 fn reach_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Outbox) -> bool {
     let language = model.view.language;
     let quality = &solved.result.quality;
@@ -181,7 +182,7 @@ fn reach_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Outbox) ->
     true
 }
 
-/// How accurate the robot is said to be, to say and to change.
+/// The stated accuracy of the robot, and a field to change it.
 fn robot_accuracy_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     let said_mm = model.document().meta.robot_accuracy_mm;
@@ -203,7 +204,7 @@ fn robot_accuracy_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             .custom_parser(millimetres)
             .update_while_editing(false);
         let response = ui.add(field).labelled_by(name.id).on_hover_text(meaning);
-        // Every value on the way of a drag would be a change of the session.
+        // Every value during a drag would be a change of the session.
         if response.drag_stopped() || (response.changed() && !response.dragged()) {
             let known = Some(accuracy_mm).filter(|mm| mm >= ROBOT_ACCURACY_MM.start());
             if known != said_mm {
@@ -223,7 +224,7 @@ fn goal_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let mut goal_mm = model.view.goal.0 * 1e3;
     // From the right: the field first, then its name.
     let field = DragValue::new(&mut goal_mm).range(0.001..=1000.0).speed(0.01).max_decimals(3).suffix(" mm");
-    // Half a number is no goal.
+    // A partly typed number is not a goal.
     let field = field.update_while_editing(false);
     let response = ui.add(field).on_hover_text(tr!(language, "The error that is good enough for what you do"));
     let name = ui.label(RichText::new(tr!(language, "Goal")).color(Palette::of(ui).weak));

@@ -1,4 +1,4 @@
-//! The answers of the closed forms beside the one that is asked for.
+//! The answers of the closed forms next to the requested one.
 
 use egui::{Grid, RichText, Ui};
 use handeye_estimate::Method;
@@ -82,7 +82,7 @@ fn row_ui(ui: &mut Ui, name: &str, answer: Option<&Pose<Mount, Camera>>, solved:
     }
 }
 
-/// A method by the names of those who published it.
+/// A method by the names of its authors.
 pub fn title(name: &'static str, language: Language) -> &'static str {
     match name {
         "joint" => tr!(language, "Joint estimate"),

@@ -1,4 +1,4 @@
-//! The answer: how far off it may be, where the camera is, and why it should be believed or not.
+//! The answer: how large its error may be, where the camera is, and why it should be believed or not.
 
 mod answer;
 mod estimate;

@@ -1,4 +1,4 @@
-//! The camera, the noise levels, and residuals, which are called what they are.
+//! The camera, the noise levels, and residuals, each called by its name.
 
 use egui::Ui;
 use handeye_estimate::resolution::{angle_text, place_text};
@@ -57,7 +57,7 @@ pub fn noise_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     }
     parts::section_ui(ui, tr!(language, "Residuals (not accuracy)"));
     stated(ui, tr!(language, "Fit, RMS"), quality.rms_px.map(|px| format!("{px:.3} px")));
-    // Of the model as it stands, with the robot's field where there is one: that is what the noise levels explain.
+    // From the complete model, with the robot's field if there is one: that is what the noise levels explain.
     let joint = solved.calibration.joint.as_ref();
     let of_model = joint.and_then(|joint| Some((joint.heldout_rms_px?, joint.expected_heldout_rms_px)));
     let heldout = match of_model {

@@ -1,4 +1,4 @@
-//! What the solver does, and what to do when it has no answer.
+//! What the solver does, and what to do if it has no answer.
 
 use egui::{Button, RichText, Ui};
 use handeye_estimate::handeye::motion::MIN_VIEWS;

@@ -222,7 +222,7 @@ fn keeping_all_views_is_one_click() {
     assert_eq!(pane.click("Keep all views"), [Command::Solve(solve::Command::SetKeepOutliers(false))]);
 }
 
-/// What the estimate found out, all of it.
+/// The findings of the estimate, all of them.
 fn with_everything_found(calibration: &mut handeye_estimate::diagnose::Calibration) {
     for view in calibration.views.iter_mut().take(2) {
         view.status = ViewStatus::Outlier;
@@ -239,7 +239,7 @@ fn with_everything_found(calibration: &mut handeye_estimate::diagnose::Calibrati
     joint.widening = Overdispersion { factor: 4.0, by: Some(Evidence::Neighbours), lens: 1.0, checks: Vec::new() };
     joint.small_sample.level_sigma = [0.1, 0.8, 0.9];
     joint.noise.view_px = 0.12;
-    // What a robot shows: less is below what any resolves, and nothing is said of it.
+    // What a robot shows: less is below what can be resolved, and is not reported.
     (joint.noise.robot_m, joint.noise.robot_rad) = (2e-4, 5e-4);
     (joint.small_sample.level_range[1], joint.small_sample.level_range[2]) = ([5e-5, 4e-4], [1e-4, 1e-3]);
     joint.robot_effect_px = 10.0;
@@ -394,7 +394,7 @@ fn every_finding_is_said_in_both_languages_with_its_numbers() {
 fn is_translated_in_both_languages(finding: &findings::Finding) {
     assert_eq!(finding.text.in_language(Language::English), finding.to_record().text);
     let chinese = finding.text.in_language(Language::Chinese);
-    // What is left of Latin words are names of files, methods, frames, units and axes.
+    // Latin words that remain are names of files, methods, frames, units and axes.
     let kept =
         "images png tsai lenz park martin horaud andreff daniilidis shah li base from tip mm m px x y z w e ChArUco";
     let kept: BTreeSet<&str> = kept.split(' ').chain([""]).collect();

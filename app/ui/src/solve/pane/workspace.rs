@@ -16,7 +16,7 @@ const FARTHEST_MM: f64 = 10_000.0;
 /// Width of a field.
 const FIELD: f32 = 76.0;
 
-/// The corners of the box, and how well points between them are measured; nothing where no uncertainty is stated.
+/// The corners of the box, and how well points between them are measured; nothing if no uncertainty is stated.
 pub fn workspace_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     let Some((work_box, error)) = model.tip_box.judged else { return };
@@ -61,7 +61,7 @@ fn corner_ui(ui: &mut Ui, is_from: bool, corner_m: &mut [f64; 3], language: Lang
             .speed(1.0)
             .max_decimals(1)
             .suffix(" mm")
-            // Half a number is no place.
+            // A partly typed number is not a place.
             .update_while_editing(false);
         let response = ui.add_sized([FIELD, ui.spacing().interact_size.y], field);
         let reported =

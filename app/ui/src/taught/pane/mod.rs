@@ -40,7 +40,7 @@ pub fn taught_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     });
 }
 
-/// What there is of other cells, and the way to say that this is the same one.
+/// The poses of other cells, and a button to state that this is the same one.
 fn elsewhere_ui(ui: &mut Ui, model: &Model, here: usize, outbox: &mut Outbox) {
     let language = model.view.language;
     let count = model.document().taught.len().saturating_sub(here);

@@ -26,7 +26,7 @@ struct Renaming {
     to: String,
 }
 
-/// How the last sequence of a pose went.
+/// The outcome of the last sequence for a pose.
 enum Mark {
     None,
     UnderWay,
@@ -117,7 +117,7 @@ fn kind_ui(ui: &mut Ui, pose: &TaughtPose, model: &Model) {
         .on_hover_text(numbers.in_language(language));
 }
 
-/// The name, which is edited where it stands.
+/// The name, which is edited in place.
 fn name_ui(ui: &mut Ui, model: &Model, poses: &[&TaughtPose], index: usize, pose: &TaughtPose, outbox: &mut Outbox) {
     let language = model.view.language;
     let id = Id::new("renaming of a taught pose");
@@ -153,7 +153,7 @@ fn name_ui(ui: &mut Ui, model: &Model, poses: &[&TaughtPose], index: usize, pose
     }
 }
 
-/// Where a row that is dragged would go, and going there.
+/// Where a dragged row would go, and dropping it.
 fn drop_ui(ui: &mut Ui, poses: &[&TaughtPose], index: usize, row: Rect, outbox: &mut Outbox) {
     let area = row.expand2(Vec2::new(0.0, ui.spacing().item_spacing.y / 2.0));
     let response = ui.interact(area, Id::new(("place of a taught pose", index)), Sense::hover());
@@ -165,7 +165,7 @@ fn drop_ui(ui: &mut Ui, poses: &[&TaughtPose], index: usize, row: Rect, outbox: 
         return;
     }
     let gap = index + usize::from(below);
-    // Its own place is free once it is taken out.
+    // Its own place becomes free when it is removed.
     let to = if gap > dragged.0 { gap - 1 } else { gap };
     if let Some(pose) = poses.get(dragged.0).filter(|_| to != dragged.0) {
         outbox.send(taught::Command::Reorder { name: pose.name.clone(), to });

@@ -1,4 +1,4 @@
-//! Teaching where the arm is, and poses from elsewhere.
+//! Teaching the present pose of the arm, and poses from elsewhere.
 
 use egui::{Button, Id, Key, TextEdit, Ui, WidgetInfo, WidgetType};
 

@@ -16,7 +16,7 @@ pub struct Blocked {
 }
 
 impl Blocked {
-    /// What stands in the way now.
+    /// What prevents it now.
     pub fn of(model: &Model) -> Self {
         let language = model.view.language;
         let is_connected = model.camera.is_connected() && model.control.is_connected();
@@ -59,7 +59,7 @@ fn follow(model: &Model) -> Option<&'static str> {
     }
 }
 
-/// Whether the arm was asked to follow and has not ended.
+/// Whether the arm was requested to follow and has not ended.
 pub fn is_following(model: &Model) -> bool {
     let track = &model.track;
     match track.follow {

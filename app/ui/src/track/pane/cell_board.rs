@@ -11,12 +11,12 @@ use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 use handeye_workbench::track;
 
-/// The first speed that is asked for [m/s]: about as fast as a slow conveyor.
+/// The first speed that is requested [m/s]: about as fast as a slow conveyor.
 const FIRST_SPEED_M_S: f64 = 0.05;
-/// Speeds that can be asked for [m/s].
+/// Speeds that can be requested [m/s].
 const SPEEDS_M_S: std::ops::RangeInclusive<f64> = 0.01..=0.5;
 
-/// The section; nothing for a cell that does not say where its board is.
+/// The section; empty for a cell that does not report where its board is.
 pub fn board_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outbox) {
     if model.cell.as_ref().is_none_or(|cell| cell.truth.is_none()) {
         return;
@@ -37,7 +37,7 @@ pub fn board_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
             ui.label(RichText::new(tr!(language, "Speed")).color(Palette::of(ui).weak));
             let mut next_m_s = speed_m_s;
             let field = DragValue::new(&mut next_m_s).range(SPEEDS_M_S).speed(0.002).max_decimals(3).suffix(" m/s");
-            // Half a number is no speed.
+            // A partly typed number is not a speed.
             let field = field.update_while_editing(false);
             let response = ui.add_sized([86.0, ui.spacing().interact_size.y], field);
             let is_enabled = ui.is_enabled();

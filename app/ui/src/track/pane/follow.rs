@@ -1,4 +1,4 @@
-//! Has the arm follow the board, and says how it goes.
+//! Makes the arm follow the board, and shows the status.
 
 use egui::{Button, DragValue, RichText, Ui, WidgetInfo, WidgetType};
 
@@ -13,10 +13,10 @@ use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 use handeye_workbench::track;
 
-/// Distances of the tip from a corner that can be asked for [mm]: nearer, the arm touches the board.
+/// Distances of the tip from a corner that can be requested [mm]: any nearer, the arm could touch the board.
 const STAND_OFFS_MM: std::ops::RangeInclusive<f64> = 20.0..=600.0;
 
-/// What is chosen before the arm is told.
+/// What is chosen before the arm gets the command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Choice {
     to_corner: bool,
@@ -88,7 +88,7 @@ pub fn follow_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Out
     }
 }
 
-/// Whether the errors of the arm are corrected, where they are known.
+/// Whether the errors of the arm are corrected, if they are known.
 fn corrected_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let Some((solved, _)) = corrected(model) else { return };
     let helps = solved.result.quality.correcting_helps();
@@ -146,7 +146,7 @@ fn choice_ui(ui: &mut Ui, model: &Model, choice: &mut Choice) {
     });
 }
 
-/// A number with a name for those who cannot see what stands beside it.
+/// A number with a name for screen readers.
 fn number_ui(ui: &mut Ui, name: &str, value: f64, field: DragValue<'_>) -> egui::Response {
     let response = ui.add_sized([72.0, ui.spacing().interact_size.y], field);
     let is_enabled = ui.is_enabled();

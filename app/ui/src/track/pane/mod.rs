@@ -1,4 +1,4 @@
-//! The board as it is tracked, and the arm that follows it.
+//! The tracked board, and the arm that follows it.
 
 mod blocked;
 mod cell_board;
@@ -17,7 +17,7 @@ use handeye_workbench::model::{Model, Moves};
 use handeye_workbench::tr;
 use handeye_workbench::track;
 
-/// What stands beside the numbers has at least this width: its buttons and plots need it.
+/// Minimum width of the column next to the numbers: its buttons and plots need it.
 const LEAST_BESIDE: f32 = 300.0;
 /// Distance of the columns.
 const GUTTER: f32 = 22.0;
@@ -27,7 +27,7 @@ pub fn track_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let blocked = Blocked::of(model);
     parts::body_ui(ui, "track", |ui| {
         tracking_ui(ui, model, &blocked, outbox);
-        // No number is broken into two lines for the sake of a second column.
+        // Numbers are never wrapped to make room for a second column.
         let numbers = pose::width(ui, model.view.rotation);
         let beside = ui.available_width() - GUTTER - numbers;
         if beside < LEAST_BESIDE {
@@ -63,7 +63,7 @@ pub fn track_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     });
 }
 
-/// Start, stop, and how it goes.
+/// Start, stop, and the status.
 fn tracking_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outbox) {
     let language = model.view.language;
     ui.horizontal_wrapped(|ui| {

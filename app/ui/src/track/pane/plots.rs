@@ -1,4 +1,4 @@
-//! The last half minute: how far off and how sure the position is, and where the board went.
+//! The last half minute: error and uncertainty of the position, and where the board went.
 
 use std::collections::VecDeque;
 
@@ -15,7 +15,7 @@ use handeye_workbench::tr;
 
 /// Length of the time axis \[s\].
 const WINDOW_S: f64 = 30.0;
-/// Numbers on the time axis are so far apart \[s\].
+/// Distance of the numbers on the time axis \[s\].
 const TICK_S: f64 = 10.0;
 /// Height of a plot.
 const HEIGHT: f32 = 128.0;

@@ -1,4 +1,4 @@
-//! Where the tracked board is in the base, by all images and by the newest alone.
+//! Where the tracked board is in the base, from all images and from the newest alone.
 
 use egui::Ui;
 use handeye_geometry::frames::{Base, Pose, Target};
@@ -12,13 +12,13 @@ use handeye_workbench::model::{Model, RotationFormat, TrackError};
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
-/// An error stays within so many standard deviations with a probability of 95 %.
+/// An error stays within this many standard deviations with a probability of 95 %.
 const SIGMAS_95: f64 = 1.96;
 
 /// Figures of a coordinate: up to 9999.99 mm with its sign.
 const FIGURES: usize = 8;
 
-/// Width at which no row of numbers breaks: of three coordinates, or of the four parts of a quaternion.
+/// Width at which no row of numbers wraps: of three coordinates, or of the four parts of a quaternion.
 pub fn width(ui: &Ui, rotation: RotationFormat) -> f32 {
     let widest = match rotation {
         RotationFormat::RollPitchYaw => numbers::row(&[-8888.88; 3], 2, FIGURES),
@@ -61,7 +61,7 @@ pub fn pose_ui(ui: &mut Ui, model: &Model) {
     }
 }
 
-/// What the error of the calibration is, of which nothing is in the numbers of the estimate.
+/// The error of the calibration, which is not included in the numbers of the estimate.
 fn calibration_text(model: &Model) -> Text {
     let quality = model.solve.current().map(|solved| &solved.result.quality);
     let reach = quality.and_then(|quality| Some((quality.reach_error_95_mm?, quality.reach_error_corrected_95_mm)));
@@ -84,8 +84,8 @@ fn calibration_text(model: &Model) -> Text {
     }
 }
 
-/// 95 % of each coordinate in the base of a pose with this covariance: of its translation, or of its turn about the axes
-/// of the base.
+/// 95 % of each coordinate in the base of a pose with this covariance: of its translation, or of its rotation about the
+/// axes of the base.
 fn within_95(base_from_target: &Pose<Base, Target>, in_target: &Matrix3<f64>) -> Vector3<f64> {
     let rotation = base_from_target.rotation().to_rotation_matrix();
     let in_base = rotation.matrix() * in_target * rotation.matrix().transpose();

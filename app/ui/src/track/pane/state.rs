@@ -10,7 +10,7 @@ use handeye_wording::text;
 use handeye_workbench::model::Model;
 use handeye_workbench::text::Text;
 
-/// How tracking goes; no tone while it is off.
+/// Status of tracking; no tone while it is off.
 pub fn state(model: &Model) -> (Option<Tone>, Text) {
     if !model.track.on {
         return (None, text!("The board is not tracked"));
@@ -18,7 +18,7 @@ pub fn state(model: &Model) -> (Option<Tone>, Text) {
     let Some(newest) = &model.track.newest else {
         return (Some(Tone::Busy), text!("Waiting for the first image…"));
     };
-    // What was seen before the camera went is history.
+    // What was seen before the camera was lost is outdated.
     if !model.camera.is_connected() {
         return (Some(Tone::Bad), text!("No connection to the camera: the board is not tracked"));
     }
@@ -40,13 +40,13 @@ pub fn state(model: &Model) -> (Option<Tone>, Text) {
     }
 }
 
-/// The state, and how many poses come and how late.
+/// The state, the rate of poses and their latency.
 pub fn state_ui(ui: &mut Ui, model: &Model) {
     let language = model.view.language;
     let palette = Palette::of(ui);
     let (tone, words) = state(model);
     let colour = tone.map_or(palette.weak, |tone| palette.tone(tone));
-    // The words break with the dot, not behind it.
+    // The words wrap together with the dot, not after it.
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 5.0;
         parts::dot_ui(ui, colour);

@@ -293,7 +293,7 @@ fn no_row_of_numbers_breaks_into_two_lines_whatever_the_width_of_the_tile() {
         let mut model = tracked();
         model.view.rotation = rotation;
         let mut pane = driven(model);
-        // The widest there are within reach of an arm.
+        // The widest values within reach of an arm.
         newest(&mut pane, |tracked| {
             let far = Pose::from_translation_xyzw([-1.125, -1.4, -1.802], [0.5, 0.5, -0.5, 0.5]);
             tracked.update.estimate.as_mut().expect("tracked").base_from_target = far;

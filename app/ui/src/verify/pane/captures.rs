@@ -1,4 +1,4 @@
-//! Every capture on its own.
+//! Every capture separately.
 
 use egui::{Grid, RichText, Ui};
 use handeye_estimate::verify::{CaptureCheck, Verification};
@@ -13,7 +13,7 @@ use handeye_workbench::session;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
-/// Squared error over what is stated that one capture in a hundred exceeds.
+/// Squared error over the stated one that one capture in a hundred exceeds.
 const UNLIKELY: f64 = 2.8;
 
 /// The table; the first column shows the image.

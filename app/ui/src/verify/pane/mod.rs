@@ -1,4 +1,4 @@
-//! How good the calibration is where it was not made: captures that never entered the fit, and points that are picked.
+//! How good the calibration is on new data: captures that never entered the fit, and points that are picked.
 
 mod captures;
 mod picked;
@@ -97,7 +97,7 @@ fn capture_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     }
 }
 
-/// Said in words and not only on the button, because it is not seen elsewhere in the pane.
+/// Shown in words and not only on the button, because it is not visible elsewhere in the pane.
 fn reason_not_connected(model: &Model) -> Option<&'static str> {
     let is_connected = model.camera.is_connected() && model.control.is_connected();
     (!is_connected).then(|| tr!(model.view.language, "Not connected: there is nothing to capture"))

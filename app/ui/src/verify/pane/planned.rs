@@ -1,4 +1,4 @@
-//! Captures for verification at poses that the program plans, visits and captures at by itself.
+//! Captures for verification at poses that the program plans and visits automatically.
 
 use egui::{Button, Spinner, Ui};
 use handeye_estimate::handeye::Mode;
@@ -13,7 +13,7 @@ use handeye_workbench::model::{CapturePurpose, Model, Motion, Pane, PoseSequence
 use handeye_workbench::taught;
 use handeye_workbench::tr;
 
-/// The button that begins, or how far it is; and how it went.
+/// The start button, or the progress; and the outcome.
 pub fn planned_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     if !model.takes_chosen_poses() {
@@ -51,7 +51,7 @@ pub fn planned_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     }
 }
 
-/// Why it cannot begin.
+/// Why it cannot start.
 fn blocked(model: &Model) -> Option<&'static str> {
     let language = model.view.language;
     let is_hand = model.calibrated().is_some_and(|calibrated| calibrated.hand_eye.mode() == Mode::EyeToHand);

@@ -10,10 +10,11 @@ use handeye_workbench::model::Model;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
-/// A ratio below that would be shown as zero.
+/// A ratio below this would be shown as zero.
 const LEAST_RATIO: f64 = 0.01;
 
-/// Errors of prediction, and whether they are as large as stated; also by corrected tip poses, where the errors of the arm are known.
+/// Errors of prediction, and whether they are as large as stated; also with corrected tip poses, if the errors of the arm are
+/// known.
 pub fn summary_ui(ui: &mut Ui, model: &Model, verification: &Verification, corrected: Option<&Verification>) {
     let language = model.view.language;
     let count = verification.captures.len();
@@ -46,7 +47,7 @@ pub fn summary_ui(ui: &mut Ui, model: &Model, verification: &Verification, corre
     verdict_ui(ui, language, verification, corrected.is_as_stated() == Some(true));
 }
 
-/// `explained` where corrected tip poses have no such errors.
+/// `explained` if corrected tip poses have no such errors.
 fn verdict_ui(ui: &mut Ui, language: Language, verification: &Verification, explained: bool) {
     let palette = Palette::of(ui);
     let (colour, verdict) = match &verification.consistency {

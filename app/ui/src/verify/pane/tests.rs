@@ -142,7 +142,7 @@ fn where_the_errors_of_the_arm_are_known_predictions_and_points_are_also_by_corr
     let twice = |depth_m| MeasuredTwice { from_depth: Ok(at(depth_m)), from_board: Ok(at(depth_m)) };
     let pixel = ImagePoint { column: 320, row: 240 };
     model.picked = Some(PickedPoint { pixel, as_reported: twice(0.3), corrected: Some(twice(0.31)) });
-    // Reported tip poses are off by more than the calibration by them states, corrected ones are not.
+    // Reported tip poses have larger errors than the calibration states for them, corrected ones do not.
     let mut worse = sample::with_errors_of_the_arm();
     let solved = Arc::make_mut(worse.solve.solved.as_mut().expect("solved"));
     let Some(Ok(verification)) = &mut solved.verification else { panic!("verified") };

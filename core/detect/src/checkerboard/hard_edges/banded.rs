@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 /// The lower part of a matrix whose elements further than `width` below the diagonal are zero.
 #[derive(Debug, Clone)]
 pub(super) struct Banded {
-    /// By row: the diagonal, then what is left of it.
+    /// By row: the diagonal, then the entries left of it.
     rows: Vec<f64>,
     width: usize,
 }
@@ -131,7 +131,7 @@ impl Factor {
 mod tests {
     use super::*;
 
-    /// Ten numbers, each of which has to do with the next three.
+    /// Ten numbers, each correlated with the next three.
     fn sample() -> (Banded, DMatrix<f64>) {
         let mut banded = Banded::zeros(10, 3);
         let mut dense = DMatrix::zeros(10, 10);

@@ -8,7 +8,7 @@ use handeye_geometry::planar_pose::homography::{homography, mapped};
 /// Degree of the polynomial that lens and bend of the board may add to a homography.
 const DEGREE: usize = 3;
 
-/// Where points of the grid are in the image by what all corners say: a homography, and a polynomial for a lens and a board
+/// Positions of the grid's points in the image, from all corners: a homography, and a polynomial for a lens and a board
 /// that is not flat where they show one.
 pub(super) struct SmoothMap {
     homography: Matrix3<f64>,
@@ -17,7 +17,7 @@ pub(super) struct SmoothMap {
     polynomial: Option<Polynomial>,
 }
 
-/// What is added to the homography.
+/// The term that is added to the homography.
 struct Polynomial {
     /// Exponents of the terms.
     terms: Vec<[usize; 2]>,
@@ -25,7 +25,7 @@ struct Polynomial {
     basis: DMatrix<f64>,
     /// The basis from the powers: `basis = powers · to_basis`.
     to_basis: DMatrix<f64>,
-    /// By basis function.
+    /// Added displacement by basis function.
     added: Vec<Vector2<f64>>,
 }
 
@@ -57,8 +57,8 @@ impl SmoothMap {
         Some(map)
     }
 
-    /// Where a point of the grid is in the image, pixels. Beyond the corners the polynomial stays what it is at the last:
-    /// it is a fit and no law.
+    /// Where a point of the grid is in the image, pixels. Beyond the corners the polynomial keeps its value at the last
+    /// one: it is a fit, not a physical model.
     pub fn at(&self, column: f64, row: f64) -> Vector2<f64> {
         let place = Vector2::new(column, row);
         let at = mapped(&self.homography, place);

@@ -1,21 +1,21 @@
 //! Corners of images without anti-aliasing, from all sides of all squares at once.
 //!
-//! A frame buffer with one sample a pixel, as CoppeliaSim's vision sensors have it, knows of an edge only between which two
-//! pixel centres of a row or a column it passes. That is a uniform error of one pixel, and no noise: it repeats as long as
-//! nothing moves. Least squares on grey levels ([`super::search`]) take it for noise and end 0.07–0.25 px off. But along its
-//! length an edge passes at many places within a pixel, and each row says *between these two*: of the places of both ends of a
-//! side of a square the rows leave a small polygon ([`polygon`]). Its centroid and its second moments are what is known of the
-//! side, and where an edge runs along a row they say that its place within the pixel is not known.
+//! A frame buffer with one sample a pixel, as CoppeliaSim's vision sensors have it, only shows between which two pixel centres
+//! of a row or a column an edge passes. That is a uniform error of one pixel, not noise: it repeats as long as nothing moves.
+//! Least squares on grey levels ([`super::search`]) treat it as noise and have errors of 0.07–0.25 px. But along its length an
+//! edge passes at many places within a pixel, and each row states *between these two*: the rows restrict the places of both
+//! ends of a side of a square to a small polygon ([`polygon`]). Its centroid and its second moments are what is known about
+//! the side, and where an edge runs along a row they show that its place within the pixel is not known.
 //!
 //! All sides together ([`side`]) are linear equations of the displacements of the corners from a smooth map of the board
-//! ([`map`]), with the moments of the polygons at first, and then with those of what the other sides leave of each polygon, by
-//! expectation propagation ([`together`]): where edges are aligned with the pixels no side knows its place, and all of them do.
-//! Of the print it is expected that corners are where that map has them to within [`PRINT_SQUARES`]: it counts where
-//! sides say nothing, and otherwise not, so that what is printed is what is found.
+//! ([`map`]), with the moments of the polygons at first, and then with those of each polygon conditioned on the other sides, by
+//! expectation propagation ([`together`]): where edges are aligned with the pixels no single side determines its place, but all
+//! of them together do. Corners of the print are expected where that map has them to within [`PRINT_SQUARES`]: this prior
+//! matters only where sides give no information, so that the printed positions are found.
 //!
-//! Sides that pass at the same place within a pixel say the same, and not each something of its own: of a board that is seen
-//! straight, with squares of a whole number of pixels, no number of sides tells where in the pixel it is. What part of a pixel
-//! no side passes is left open in the covariance of all corners together ([`Phases`]).
+//! Sides that pass at the same place within a pixel are not independent: for a board that is seen straight, with squares of a
+//! whole number of pixels, no number of sides determines where in the pixel it is. The part of a pixel that no side passes is
+//! added to the covariance of all corners together ([`Phases`]).
 //!
 //! Corners share the ends of sides, so what is stated is the covariance of all of them.
 //!
@@ -36,44 +36,45 @@ use map::SmoothMap;
 use side::{Edge, Passage, Reach, Side};
 use together::{Displacements, Expected};
 
-/// How far a corner may be printed from where a smooth map of the board has it, one standard deviation per axis, in squares:
-/// 0.1 mm of 15 mm, which is much for a print.
+/// Printing error of a corner relative to a smooth map of the board, one standard deviation per axis, in squares: 0.1 mm of
+/// 15 mm, which is much for a print.
 const PRINT_SQUARES: f64 = 0.007;
-/// Part of the pixels beside edges that may be neither dark nor light. Averaging over pixels leaves three in five, a frame
-/// buffer none but where a texture is filtered.
+/// Part of the pixels next to edges that may be neither dark nor light. Averaging over pixels leaves three in five, a
+/// frame buffer none except where a texture is filtered.
 const MOST_MIXED: f64 = 0.25;
-/// Rows and columns that are looked at before an image with softer edges is given back.
+/// Rows and columns that are checked before an image with softer edges is rejected.
 const ENOUGH: usize = 150;
-/// Least part of the sides of squares that must say something.
+/// Smallest share of a square's sides that must give information.
 const LEAST_SIDES: f64 = 0.6;
-/// A corner that moves further than this \[px\] was not where the search had it, or its sides are no edges of the board.
+/// A corner that moves further than this \[px\] was not where the search had it, or its sides are not edges of the
+/// board.
 const FURTHEST_PX: f64 = 1.5;
 
-/// How far to either side of where an edge is expected pixels are looked at, as a part of a square and in pixels at the most:
-/// at first, and when the places of the corners are known to a tenth of a pixel. The less, the nearer to its ends an edge can
-/// be looked at.
+/// How far to either side of an edge's expected place pixels are read, as a part of a square and at most in pixels: at first,
+/// and when the places of the corners are known to a tenth of a pixel. The smaller, the nearer to its ends an edge can be
+/// read.
 const REACHES: [Reach; 2] = [Reach { part: 0.3, most_px: 2.0 }, Reach { part: 0.2, most_px: 1.0 }];
 
-/// Rounds in which each polygon is seen in the light of all others. A round solves the equations of all corners once more.
+/// Rounds in which each polygon is combined with all others. A round solves the equations of all corners once more.
 const ROUNDS: usize = 6;
 
 /// The corners of an image with hard edges.
 pub(super) struct Refined {
     /// All corners with their covariances.
     pub corners: Ordered,
-    /// Which of them have a side along rows and one along columns that counts; the others are where those have them.
+    /// Which corners have a usable side along rows and one along columns; the others follow from these.
     pub seen: Vec<bool>,
 }
 
-/// The corners of an image with hard edges, with their covariances; `None` where edges are softer, or the board is not seen
-/// whole enough: then what the search found stands.
+/// The corners of an image with hard edges, with their covariances; `None` where edges are softer, or too little of the
+/// board is seen: then the result of the search is kept.
 pub(super) fn refine(image: &GrayImage, found: &Ordered) -> Option<Refined> {
     let [first, second] = &REACHES;
     let near = Pass::of(image, found, first, 0)?;
     let near = Ordered { points: near.points, ..found.clone() };
     let Pass { points, displacements, open_px2, seen } = Pass::of(image, &near, second, ROUNDS)?;
     let mut covariance_px2 = displacements.covariance_px2();
-    // Of all corners together.
+    // Covariance of all corners together.
     for a in 0..points.len() {
         for b in 0..points.len() {
             let mut shared = covariance_px2.fixed_view_mut::<2, 2>(2 * a, 2 * b);
@@ -83,7 +84,7 @@ pub(super) fn refine(image: &GrayImage, found: &Ordered) -> Option<Refined> {
     Some(Refined { corners: Ordered::together(points, covariance_px2, found.columns), seen })
 }
 
-/// All sides looked at once.
+/// All sides, measured once.
 struct Pass {
     points: Vec<Vector2<f64>>,
     displacements: Displacements,
@@ -144,7 +145,8 @@ impl Pass {
     }
 }
 
-/// Where within a pixel edges pass, −½ to ½, for those that run across rows and those that run across columns.
+/// Places within a pixel at which edges pass, −½ to ½, for those that run across rows and those that run across
+/// columns.
 #[derive(Default)]
 struct Phases([Vec<f64>; 2]);
 
@@ -152,7 +154,7 @@ impl Phases {
     /// Part of the passages at either end of what they cover that may be wrong.
     const WRONG: f64 = 0.02;
 
-    /// The passages of a side with its ends displaced by so many pixels along its normal.
+    /// The passages of a side with its ends displaced by `[a, b]` pixels along its normal.
     fn add(&mut self, edge: &Edge, passages: &[Passage], [a, b]: [f64; 2]) {
         let across = edge.normal[edge.cross];
         let phase = |passage: &Passage| {

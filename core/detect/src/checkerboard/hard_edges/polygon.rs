@@ -4,10 +4,10 @@ use nalgebra::{Matrix2, Vector2};
 
 /// How far the ends of an edge can be from where they are expected before anything is known, pixels.
 const FURTHEST_PX: f64 = 3.0;
-/// What no rasteriser resolves, pixels: vertices are rounded to a 256th, and so are coordinates of textures.
+/// Resolution of rasterisers, pixels: vertices are rounded to a 256th, and so are coordinates of textures.
 const RASTER_PX: f64 = 0.004;
 
-/// How many standard deviations of a Gaussian count.
+/// Number of standard deviations of a Gaussian that are used.
 const WITHIN: f64 = 6.0;
 /// Slices are taken in this many parts.
 const PANELS: u32 = 3;
@@ -21,7 +21,7 @@ const GAUSS: [(f64, f64); 6] = [
     (0.966_234_757_101_576, 0.085_662_246_189_585),
 ];
 
-/// What is left of the places of two ends of an edge by lines that it must pass between.
+/// The possible places of the two ends of an edge, given the lines that it must pass between.
 #[derive(Debug, Clone)]
 pub(super) struct Polygon {
     corners: Vec<Vector2<f64>>,
@@ -60,7 +60,7 @@ impl Polygon {
         self.corners = left;
     }
 
-    /// Those of a point that is anywhere in it with equal probability; `None` when nothing is left.
+    /// Moments of a point that is uniformly distributed in it; `None` when it is empty.
     pub fn moments(&self) -> Option<Moments> {
         let first = *self.corners.first()?;
         let (mut area, mut sum, mut squares) = (0.0, Vector2::zeros(), Matrix2::zeros());
@@ -81,8 +81,8 @@ impl Polygon {
         Some(Moments { mean: first + mean, covariance })
     }
 
-    /// Those of a point that is Gaussian and known to be in it, by Gauss's rule over slices; `None` where the two have next
-    /// to nothing in common.
+    /// Moments of a Gaussian point that is known to be in it, by Gauss's rule over slices; `None` where the two hardly
+    /// overlap.
     pub fn moments_of(&self, gaussian: &Moments) -> Option<Moments> {
         let sigma = gaussian.covariance.m11.sqrt();
         let range = |values: &mut dyn Iterator<Item = f64>| {

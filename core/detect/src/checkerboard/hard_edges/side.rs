@@ -8,19 +8,19 @@ use super::polygon::{Moments, Polygon};
 
 /// Least distance of a row from an end \[px\]: nearer, it may be the other edge that it crosses.
 const MARGIN_PX: f64 = 1.0;
-/// A pixel that is off its square by more than this part of the contrast is neither dark nor light.
+/// A pixel that differs from its square by more than this part of the contrast is neither dark nor light.
 const MIXED: f64 = 0.2;
 /// Least contrast in grey levels.
 const MIN_CONTRAST: f64 = 20.0;
-/// Least rows of a side that say something.
+/// Fewest rows of a side that are used.
 const MIN_ROWS: usize = 3;
-/// By how much rows may contradict each other \[px\]: a rasteriser rounds, a side may bend a little. What still leaves
-/// nothing is no straight edge.
+/// Largest contradiction between rows \[px\]: a rasteriser rounds, a side may bend a little. If the polygon is still
+/// empty, it is not a straight edge.
 const SLACK_PX: [f64; 3] = [0.005, 0.05, 0.2];
 
-/// How far to either side of an edge pixels are looked at.
+/// How far to either side of an edge pixels are read.
 pub(super) struct Reach {
-    /// As a part of a square.
+    /// Distance as a part of a square.
     pub part: f64,
     pub most_px: f64,
 }
@@ -40,28 +40,28 @@ pub(super) struct Side {
     pub ends: [End; 2],
 }
 
-/// What the rows leave of the displacements of the ends of a side.
+/// The displacements of the ends of a side that the rows allow.
 #[derive(Debug, Clone)]
 pub(super) struct Edge {
     /// The direction in which both ends move, in the image.
     pub normal: Vector2<f64>,
-    /// The axis along which the edge was looked for: 0 along rows, 1 along columns.
+    /// The axis along which the edge was searched: 0 along rows, 1 along columns.
     pub cross: usize,
-    /// Where they can be, pixels.
+    /// Possible displacements, pixels.
     pub polygon: Polygon,
     /// Mean and covariance of that, everything in it being as probable.
     pub moments: Moments,
 }
 
-/// What was seen of a side.
+/// Observations of a side.
 pub(super) struct Seen {
     pub edge: Option<Edge>,
     pub passages: Vec<Passage>,
-    /// Of how many of them a pixel beside the edge is neither dark nor light.
+    /// Number of those where a pixel next to the edge is neither dark nor light.
     pub mixed: usize,
 }
 
-/// The edge passes `low` to `high` pixels beside where it is expected, along the row or column, at `part` of its length.
+/// The edge passes `low` to `high` pixels from its expected place, along the row or column, at `part` of its length.
 pub(super) struct Passage {
     pub part: f64,
     pub low: f64,
@@ -69,8 +69,8 @@ pub(super) struct Passage {
 }
 
 impl Side {
-    /// All sides that end at a corner, those that leave it for the outline of the print included; the outline itself not,
-    /// because beyond it is what the board lies on.
+    /// All sides that end at a corner, those that leave it for the outline of the print included; the outline itself is
+    /// left out, because beyond it is the support of the board.
     pub fn all(columns: usize, rows: usize) -> Vec<Self> {
         let (last_column, last_row) = (columns as i64, rows as i64);
         let end = |column: i64, row: i64| {
@@ -96,7 +96,7 @@ impl Side {
         let length = way.norm();
         let mut seen = Seen { edge: None, passages: Vec::new(), mixed: 0 };
         let Some(normal) = Vector2::new(-way.y, way.x).try_normalize(1e-9) else { return seen };
-        // Rows are counted along `main`; the step is looked for along the other axis.
+        // Rows are counted along `main`; the step is searched along the other axis.
         let main = usize::from(way.y.abs() >= way.x.abs());
         let cross = 1 - main;
         // Off the line between the ends: perspective moves the middle along it, which bends nothing.
@@ -128,7 +128,7 @@ impl Side {
         map.at(0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]))
     }
 
-    /// From which distance on rows do not meet the other edge of an end within reach.
+    /// Distance from which on rows do not meet the other edge of an end within reach.
     fn margin(&self, map: &SmoothMap, end: usize, main: usize, reach: f64) -> f64 {
         let [column, row] = self.ends[end].place.map(|value| value as f64);
         let (by_column, by_row) = if self.is_along_rows() { (0.0, 0.5) } else { (0.5, 0.0) };
@@ -138,8 +138,8 @@ impl Side {
     }
 }
 
-/// The coordinate of the last pixel before the one step within reach of where it is expected, and whether a pixel beside it
-/// is neither dark nor light. `None` where there is no such step, or more than one.
+/// The coordinate of the last pixel before the one step within reach of where it is expected, and whether a pixel next to
+/// it is neither dark nor light. `None` where there is no such step, or more than one.
 fn step(image: &GrayImage, main: usize, row: f64, expected: f64, reach: f64) -> Option<(f64, bool)> {
     let size = [image.width(), image.height()].map(f64::from);
     let (first, last) = ((expected - reach).floor(), (expected + reach).ceil());
@@ -171,7 +171,7 @@ fn step(image: &GrayImage, main: usize, row: f64, expected: f64, reach: f64) -> 
     Some((before, part(before) > MIXED || part(before + 1.0) < 1.0 - MIXED))
 }
 
-/// Where both ends can be along the normal.
+/// The displacements of both ends along the normal that are possible.
 fn left_by(passages: &[Passage], normal: Vector2<f64>, cross: usize, slack: f64) -> Option<Edge> {
     let mut polygon = Polygon::unbounded();
     // A step of one pixel along the row is less across the edge.

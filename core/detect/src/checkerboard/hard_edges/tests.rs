@@ -29,7 +29,7 @@ impl Drawn {
         Self::within(random, [0.0..45.0, 0.3..0.55], roll, print_squares)
     }
 
-    /// Tilted by so many degrees, so many metres away.
+    /// Tilted by this many degrees, at this distance in metres.
     fn within(random: &mut ChaCha8Rng, [tilt, away]: [Range<f64>; 2], roll: f64, print_squares: f64) -> Self {
         loop {
             let towards: f64 = random.random_range(0.0..std::f64::consts::TAU);
@@ -82,14 +82,14 @@ impl Drawn {
         })
     }
 
-    /// Where the corners were printed.
+    /// True positions of the printed corners.
     fn truth(&self) -> Vec<Vector2<f64>> {
         let place = |i: usize| [(i % GRID.columns) as i64, (i / GRID.columns) as i64];
         let printed = |[c, r]: [i64; 2]| Vector2::new(self.line(0, c), self.line(1, r));
         (0..GRID.len()).map(|i| mapped(&self.map, printed(place(i)))).collect()
     }
 
-    /// As the search may leave it: a few tenths of a pixel off.
+    /// As the search may find it: a few tenths of a pixel off.
     fn found(&self, random: &mut ChaCha8Rng) -> Ordered {
         let mut near = |px: Vector2<f64>| px + Vector2::new(normal(random), normal(random)) * 0.25;
         Ordered::new(self.truth().into_iter().map(&mut near).collect(), &GRID)
@@ -141,7 +141,8 @@ fn corners_of_hard_edges_are_found_where_they_were_printed_to_what_is_stated() {
              {worst:.3} in one image"
         );
         assert!(refined_px < 0.08 && refined_px < 0.8 * searched_px, "{searched_px} {refined_px}");
-        // A print as bad as expected would be at 1. A better one is stated with too much, and none with too little.
+        // A print as inaccurate as expected would be at 1. For a better one the stated deviation is too large; it is
+        // never too small.
         assert!((0.4..1.15).contains(&relative), "{relative}");
     }
 }
@@ -153,7 +154,7 @@ fn a_map_by_all_corners_is_as_good_as_their_covariance_says_and_better_than_by_e
     let mut random = ChaCha8Rng::seed_from_u64(10);
     let (mut together, mut each, mut relative, mut count) = (0.0, 0.0, 0.0, 0.0);
     for i in 0..24 {
-        // Turned by 1° to 179° against the pixels: of a board along them nobody knows the place.
+        // Turned by 1° to 179° against the pixels: for a board along them the place is not determined.
         let drawn = Drawn::random(&mut random, 0.02 + f64::from(i % 12) * 0.26, 0.0);
         let found = refine(&drawn.image(1), &drawn.found(&mut random)).expect("hard edges").corners;
         let truth = drawn.truth();
@@ -193,7 +194,7 @@ fn a_map_by_all_corners_is_as_good_as_their_covariance_says_and_better_than_by_e
     assert!((0.5..1.15).contains(&relative), "{relative} of what is stated");
 }
 
-/// A finger of a gripper over the outline of the print, at a slope of its own to the last sides.
+/// A finger of a gripper over the outline of the print, at a different slope from the last sides.
 #[test]
 fn an_edge_of_what_hides_the_outline_is_not_taken_for_the_end_of_a_side() {
     let mut random = ChaCha8Rng::seed_from_u64(9);
@@ -201,7 +202,7 @@ fn an_edge_of_what_hides_the_outline_is_not_taken_for_the_end_of_a_side() {
     for i in 0..6 {
         let drawn = Drawn::within(&mut random, [5.0..25.0, 0.3..0.35], 0.2 + f64::from(i) * 0.07, 0.0);
         let mut image = drawn.image(1);
-        // Along the line from beside the corner of the print to the middle of the first outer square.
+        // Along the line from a point next to the corner of the print to the middle of the first outer square.
         let at = |c: f64, r: f64| mapped(&drawn.map, Vector2::new(c, r));
         let (from, to) = (at(8.72, -1.2), at(9.05, -0.25));
         let normal = Vector2::new(-(to - from).y, (to - from).x).normalize();
@@ -221,8 +222,8 @@ fn an_edge_of_what_hides_the_outline_is_not_taken_for_the_end_of_a_side() {
     assert!(worst_px < 0.25, "{worst_px} px");
 }
 
-/// Perspective moves the middle of a side along it, and that is no bend: counted as one, it put corners off by many times what
-/// is stated, all of a board to one side, and the focal length of a session by 0.012 %.
+/// Perspective moves the middle of a side along it, which is not a bend: counted as one, it displaced corners by many times
+/// the stated deviation, all of a board to one side, and the focal length of a session by 0.012 %.
 #[test]
 fn sides_that_run_obliquely_on_a_tilted_board_are_straight() {
     let mut random = ChaCha8Rng::seed_from_u64(8);
@@ -242,7 +243,7 @@ fn edges_along_rows_are_stated_to_be_unknown_within_the_pixel_but_for_what_the_b
     let map = Matrix3::new(22.0, 0.0, 200.3, 0.0, 22.0, 150.4, 0.0, 0.0, 1.0);
     let drawn = Drawn { map, lines: [vec![0.0; 12], vec![0.0; 9]] };
     let found = refine(&drawn.image(1), &drawn.found(&mut random)).expect("hard edges").corners;
-    // Every line of the grid has the same place within its pixel: no number of squares tells it.
+    // Every line of the grid has the same place within its pixel: no number of squares determines it.
     let (off, sd): (Vec<f64>, Vec<f64>) = found
         .points
         .iter()

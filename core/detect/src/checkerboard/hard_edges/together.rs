@@ -1,8 +1,8 @@
 //! All sides together.
 //!
-//! The displacements of all corners are Gaussian with what is expected of the print, and each side says of those of its two
-//! ends that they are in a polygon. Each polygon is replaced by a Gaussian message such that mean and covariance of what
-//! all other messages leave of its ends are those that the polygon leaves of it.
+//! The displacements of all corners are Gaussian with the prior of the print, and each side restricts those of its two ends
+//! to a polygon. Each polygon is replaced by a Gaussian message such that it changes mean and covariance of its ends, given
+//! all other messages, in the same way as the polygon.
 //!
 //! Reference: Minka 2001, "Expectation propagation for approximate Bayesian inference"; Cunningham, Hennig & Lacoste-Julien 2011,
 //! "Gaussian probabilities and expectation propagation" (polyhedra).
@@ -16,8 +16,8 @@ use super::side::Edge;
 /// Part of the way that a message goes in a round: all change at once.
 const DAMPING: f64 = 0.7;
 
-/// Squared distance, in standard deviations of both, from which what a side says contradicts all others: no corner may be so
-/// far within the polygon of its side, so this is another edge, of what hides the end of the side or of its shadow.
+/// Squared distance, in standard deviations of both, from which a side contradicts all others: no corner may be this far
+/// within the polygon of its side, so this is another edge, of an object that hides the end of the side or of its shadow.
 const CONTRADICTS: f64 = 25.0;
 
 /// Displacements of all corners, pixels.
@@ -38,14 +38,14 @@ impl Displacements {
             .collect()
     }
 
-    /// Of x and y of each in turn.
+    /// Covariance of x and y of each corner in turn.
     pub fn covariance_px2(&self) -> DMatrix<f64> {
         self.all.factor.inverse() + self.all.open.transpose() * &self.all.open
     }
 }
 
-/// What a side says of the displacements of its ends along its normal, as a Gaussian: precision, and precision times mean.
-/// Of an end that is no corner nothing is asked.
+/// The message of a side about the displacements of its ends along its normal, as a Gaussian: precision, and precision
+/// times mean. An end that is not a corner is ignored.
 struct Message<'a> {
     ends: [Option<usize>; 2],
     edge: &'a Edge,
@@ -54,23 +54,23 @@ struct Message<'a> {
     weighted: Vector2<f64>,
 }
 
-/// What is expected of all corners before any side is looked at.
+/// Prior of all corners before any side is used.
 pub(super) struct Expected {
     /// Displacements that a map of the board could take up, orthonormal: of them nothing is expected.
     pub smooth: DMatrix<f64>,
-    /// Besides them corners are independent, so far off in each axis.
+    /// Apart from them corners are independent, with this standard deviation per axis.
     pub print_px: f64,
-    /// Columns of the grid: corners whose numbers differ by more are no neighbours.
+    /// Columns of the grid: corners whose numbers differ by more are not neighbours.
     pub columns: usize,
 }
 
 /// The displacements of all corners, x and y of each in turn.
 ///
-/// What sides and print say has a band; that of the smooth displacements nothing is expected takes a matrix of low rank from it,
-/// which by the identity of Woodbury adds one of the same rank to the covariance.
+/// The precision from sides and print is banded; as smooth displacements have no prior, a matrix of low rank is subtracted from
+/// it, which by the Woodbury identity adds one of the same rank to the covariance.
 struct Gaussian {
     mean: Vec<f64>,
-    /// Of the precision before anything is taken from it.
+    /// Factor of the precision before the subtraction.
     factor: Factor,
     /// Its inverse within the band.
     near: DMatrix<f64>,
@@ -112,7 +112,7 @@ fn worst(messages: &[Message<'_>], all: &Gaussian) -> Option<usize> {
 }
 
 impl<'a> Message<'a> {
-    /// By the polygon alone.
+    /// From the polygon alone.
     fn first(number: usize, ends: [Option<usize>; 2], edge: &'a Edge) -> Option<Self> {
         let Moments { mean, covariance } = edge.moments;
         let precision = match ends {
@@ -124,7 +124,7 @@ impl<'a> Message<'a> {
         Some(Self { ends, edge, number, precision, weighted: precision * mean })
     }
 
-    /// Squared distance of what it says from what all others say, in standard deviations of the difference.
+    /// Squared distance between its message and that of all others, in standard deviations of the difference.
     fn contradiction(&self, all: &Gaussian) -> Option<f64> {
         let along = |corners: [usize; 2]| all.along(corners, &self.edge.normal);
         let both = |of_all: &Moments| {
@@ -150,7 +150,7 @@ impl<'a> Message<'a> {
         }
     }
 
-    /// By the polygon and what all others say of both ends. It stays as it is where they contradict it.
+    /// Updates the message from the polygon and all others about both ends. It is kept where they contradict it.
     fn hear(&mut self, all: &Gaussian) {
         let [Some(a), Some(b)] = self.ends else { return };
         let Some((precision, weighted)) = self.heard(&all.along([a, b], &self.edge.normal)) else { return };
@@ -166,7 +166,7 @@ impl<'a> Message<'a> {
         let others = Moments { mean: others_covariance * others_weighted, covariance: others_covariance };
         let both = self.edge.polygon.moments_of(&others)?;
         let both_precision = both.covariance.try_inverse()?;
-        // What cuts a Gaussian off makes it no wider; rounding may.
+        // Truncating a Gaussian does not widen it; rounding may.
         let mut eigen = (both_precision - others_precision).symmetric_eigen();
         eigen.eigenvalues.apply(|value| *value = value.max(0.0));
         Some((eigen.recompose(), both_precision * both.mean - others_weighted))

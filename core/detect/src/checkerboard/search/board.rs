@@ -1,8 +1,8 @@
 //! All corners of a board, refined together.
 //!
-//! Corner by corner first, on the level of the pyramid where the board was found. Then the neighbours say how the edges
-//! bend (lens), and all corners how the light falls off, which a single window of a blurred corner cannot tell from a
-//! shift; with that every corner is fitted in the image itself, in a larger window.
+//! Corner by corner first, on the level of the pyramid where the board was found. Then the neighbours show how the
+//! edges bend (lens), and all corners how the light falls off, which a single window of a blurred corner cannot
+//! distinguish from a shift; with that every corner is fitted in the image itself, in a larger window.
 
 use nalgebra::{SMatrix, SVector, Vector2};
 
@@ -17,7 +17,7 @@ use handeye_geometry::progress::CancelToken;
 use handeye_geometry::statistics::median_high;
 
 /// Part of a grid step up to which a pixel counts for the first fit, and the part tried when that fails: the outermost
-/// squares of some boards are cut narrow, and dirt or a shadow may lie on a square.
+/// squares of some boards are cut narrow, and dirt or a shadow may be on a square.
 const FIRST_PARTS: [f64; 2] = [0.42, 0.22];
 /// Squares so small that this many pixels are more than the part above are used to there, up to the largest part.
 const LEAST_REACH_PX: f64 = 3.0;
@@ -31,28 +31,28 @@ const SECOND_REACH_PX: f64 = 15.0;
 const BLURS_CLEAR: f64 = 2.5;
 /// Pixels count to this many blurs and pixels from an edge.
 const BAND: (f64, f64) = (2.6, 1.2);
-/// Steps of the corner that end the first and the second fit [px]: what is left after is a tenth of that.
+/// Steps of the corner that end the first and the second fit [px]: the remaining error is a tenth of that.
 const CONVERGED_PX: [f64; 2] = [0.1, 0.003];
 /// A second fit that moved the corner further than this \[px\] is repeated with the window around it.
 const OFF_MIDDLE_PX: f64 = 0.35;
-/// Second fits at the most: as the first one has it, around where that led to, and with the profile of a sharp edge.
+/// Most second fits: the result of the first one, around its position, and with the profile of a sharp edge.
 const MOST_FITS: usize = 3;
-/// Blur that a first fit starts from where no other corner was fitted yet \[px\], and the least as a part of how far off
-/// the corner may be: a wide edge is felt from further away.
+/// Blur that a first fit starts from where no other corner was fitted yet \[px\], and its minimum as a part of the
+/// corner's possible error: a wide edge can be found from further away.
 const START_BLUR_PX: f64 = 1.0;
 const BLUR_PER_PX: f64 = 0.3;
-/// Below this blur an edge is integrated over the pixels: beyond, a Gaussian is off by `2 · 0.55 / (24 · 120 σ⁴)` of the
-/// contrast at the most ([`super::edge`]), in full contrast less than the deviation of rounding to whole grey levels.
+/// Below this blur an edge is integrated over the pixels: beyond, the error of a Gaussian is `2 · 0.55 / (24 · 120 σ⁴)`
+/// of the contrast at most ([`super::edge`]), in full contrast less than the deviation of rounding to whole grey levels.
 const SHARP_PX: f64 = 0.64;
-/// Pixels within so many blurs of both edges see both, and how far off the corner may be besides \[px\].
+/// Pixels within this many blurs of both edges see both; and the error of the corner that is added \[px\].
 const MEETING: (f64, f64) = (2.5, 0.2);
 /// Furthest usual move of the second fit, in pixels of the level and on top of what the first fit states.
 const USUAL_MOVE: f64 = 0.2;
 /// Largest move from the start that is believed: a part of the spacing, at least that many pixels.
 const MAX_MOVE: (f64, f64) = (0.25, 1.0);
-/// How well the levels over the board tell the relative gradient of the light [1/px].
+/// Standard deviation of the light's relative gradient by the levels over the board [1/px].
 const LIGHT_SD: f64 = 5e-4;
-/// Corners that are needed to say how the light falls off: twice as many as it has numbers.
+/// Corners that are needed to determine how the light falls off: twice as many as it has parameters.
 const MIN_LEVELS: usize = 12;
 
 /// Refines a board found to a pixel or so on `levels[depth]`, in pixels of that level. The result is in pixels of
@@ -97,11 +97,11 @@ pub(super) fn refine(
             let fit = second_fit(image, &window, spacing, gradient, start);
             fit.filter(|fit| (fit.px - start.px).norm() <= usual)
         };
-        // What a coarser level says about the blur is too much where edges are sharp.
+        // The blur of a coarser level is too large where edges are sharp.
         let like_the_last = blur_px.filter(|_| depth > 0).map(|blur_px| Fit { blur_px, ..*start }.with_its_blur());
         let second = like_the_last.and_then(|start| from(&start)).or_else(|| from(start));
         blur_px = second.map(|fit| fit.blur_px).or(blur_px);
-        // On a coarse level the first fit is not good enough to stand.
+        // On a coarse level the first fit is not good enough to be kept.
         let Some(fit) = second.or((depth == 0).then_some(*start)) else { continue };
         out.points[index] = fit.px;
         out.covariances_px2[index] = Some(fit.covariance_px2);
@@ -125,7 +125,7 @@ fn enlarged(fit: Fit, scale: f64) -> Fit {
     Fit { px: full_px(fit.px, scale), covariance_px2: fit.covariance_px2 * scale * scale, parameters, blur_px, ..fit }
 }
 
-/// Fits at the points of `found`, which are known to `within_px` or so, where there is none yet.
+/// Fits at the points of `found`, which are known to about `within_px`, where there is none yet.
 fn add_first_fits(
     level: &Level,
     found: &Ordered,
@@ -238,7 +238,7 @@ impl Bends {
     }
 }
 
-/// Of the curve through three points, such that `n·d + ½ κ (t·d)² = 0` on it.
+/// Curvature of the curve through three points, such that `n·d + ½ κ (t·d)² = 0` on it.
 fn curvature(a: Vector2<f64>, b: Vector2<f64>, c: Vector2<f64>) -> f64 {
     let chord = c - a;
     let normal = Vector2::new(-chord.y, chord.x) / chord.norm();

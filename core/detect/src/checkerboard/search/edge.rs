@@ -6,16 +6,16 @@
 //!
 //! `E(s) = (G(s + p) − G(s + q) − G(s − q) + G(s − p)) / |nx ny|`, `p, q = (|nx| ± |ny|) / 2`, `G'' = erf(· / √2 l)`,
 //!
-//! for no blur the exact area. Its variance is `σ² = l² + 1/12` for any direction; that `σ` is what is called blur. Where
-//! it is large, `erf(s / √2 σ)` is the same and takes a quarter of the time: the difference is that of the fourth
-//! cumulants, at the most `2 · 0.55 / (24 · 120 σ⁴)` of the contrast.
+//! for no blur the exact area. Its variance is `σ² = l² + 1/12` for any direction; that `σ` is called blur. Where it is
+//! large, `erf(s / √2 σ)` is the same and takes a quarter of the time: the difference is that of the fourth cumulants, at
+//! most `2 · 0.55 / (24 · 120 σ⁴)` of the contrast.
 
 use super::patch::{Group, LANES};
 
 /// Variance of the area of a pixel \[px²\], in any direction.
 pub(super) const PIXEL_AREA: f64 = 1.0 / 12.0;
-/// Least blur of the lens that is told from none [px]: there an edge along the pixels has moved no grey level by as much
-/// as one in full contrast.
+/// Smallest blur of the lens that is distinguished from none [px]: there an edge along the pixels has moved no grey
+/// level by as much as one in full contrast.
 const LEAST_LENS_PX: f32 = 0.01;
 /// Least width of the narrower box: it keeps the second difference clear of rounding in single precision, and nothing is
 /// as sharp as that.
@@ -46,7 +46,7 @@ pub(super) struct Place {
 pub(super) struct Edge {
     /// Distance along the edge from the corner \[px\].
     pub along: [f32; LANES],
-    /// What is seen of a step from −1 to 1, and its derivatives by the distance and by the blur [1/px].
+    /// The image of a step from −1 to 1, and its derivatives by the distance and by the blur [1/px].
     pub value: [f32; LANES],
     pub slope: [f32; LANES],
     pub widening: [f32; LANES],
@@ -64,7 +64,7 @@ impl Edge {
         }
     }
 
-    // A call of its own: inlined, the compiler works on both edges of one pixel instead of one edge of many.
+    // A separate call: inlined, the compiler works on both edges of one pixel instead of one edge of many.
     #[inline(never)]
     fn blurred(group: &Group, centre: [f32; 2], t: [f32; 2], bend: f32, blur: f32) -> Self {
         let nothing = [0.0; LANES];

@@ -5,11 +5,12 @@
 //!
 //! `I(p) = (1 + g·d) · (m + a · (E₁(s₁) E₂(s₂) + M(s₁, s₂)))`, `d = p − c`, `sₖ = nₖ·d + ½ κₖ (tₖ·d)²`
 //!
-//! with the corner `c`, the unit normals `n₁`, `n₂` and tangents `t₁`, `t₂` of the edges, their curvatures `κ₁`, `κ₂`
-//! (the bend that a lens gives to straight lines, known from the neighbours), the mean level `m`, a relative gradient `g` of
-//! the light and the signed contrast `a`. `E` is the profile of an edge ([`super::edge`]), `M` what is beyond the product
-//! where the edges meet ([`super::meeting`]); both depend on the blur `σ`. All but the curvatures are fitted by
-//! Levenberg–Marquardt. Pixels at either end of the scale that the model expects beyond it say nothing and are left out.
+//! with the corner `c`, the unit normals `n₁`, `n₂` and tangents `t₁`, `t₂` of the edges, their curvatures `κ₁`, `κ₂` (the
+//! bend that a lens gives to straight lines, known from the neighbours), the mean level `m`, a relative gradient `g` of the
+//! light and the signed contrast `a`. `E` is the profile of an edge ([`super::edge`]), `M` what is beyond the product where
+//! the edges meet ([`super::meeting`]); both depend on the blur `σ`. All but the curvatures are fitted by
+//! Levenberg–Marquardt. Pixels at either end of the scale that the model expects beyond it give no information and are left
+//! out.
 //!
 //! The covariance is that of least squares, `s² (JᵀJ)⁻¹` with `s²` the mean square of what the fit leaves.
 //!
@@ -24,8 +25,8 @@ use super::patch::{BLUR, FREE, Group, LANES, Parameters, Patch, Window};
 
 /// The first parameters change sign under half a turn about the corner: the corner (2) and the gradient of the light (2).
 /// The others do not: directions of the edges (2), blur, level, contrast. Where an edge is blurred over several pixels
-/// the former say nothing about the latter, and their products are not summed; pixels as wide as the edge lie to one side
-/// of it or the other, and there they are.
+/// the former are independent of the latter, and their products are not summed; pixels as wide as the edge lie to one
+/// side of it or the other, and there they are.
 const ODD: usize = 4;
 const EVEN: usize = FREE - ODD;
 const PAIRS: usize = FREE * (FREE + 1) / 2;
@@ -40,11 +41,11 @@ const LAST_GAIN: f64 = 0.05;
 const LEFT_PART: f64 = 0.05;
 /// A step that changes the blur by as much as this \[px\] gains as much as rounding takes from one pixel.
 const SMALL_BLUR_PX: f64 = 0.1;
-/// Part of the blur of the lens that one step may leave, and what is left of it in the end \[px\].
+/// Part of the blur of the lens that one step may leave, and its smallest value \[px\].
 const LENS_PER_STEP: f64 = 0.25;
 const NO_LENS_PX: f64 = 0.05;
 /// Least blur of the Gaussian profile, and least that a fit over the area of pixels starts from \[px\]: of an edge that is
-/// sharper, samples a pixel apart see one at the most, and its blur is not told from its place.
+/// sharper, samples a pixel apart see at most one, and its blur cannot be separated from its place.
 pub(super) const SHARPEST_PX: f64 = 0.4;
 /// At this blur \[px\] a fit has found something else than a corner.
 const MAX_BLUR_PX: f64 = 8.0;
@@ -72,7 +73,7 @@ pub(super) struct Light {
 pub(super) struct Fit {
     pub px: Vector2<f64>,
     pub covariance_px2: Matrix2<f64>,
-    /// What a further fit starts from.
+    /// Start of a further fit.
     pub parameters: Parameters,
     pub blur_px: f64,
     /// Mean level at the corner \[grey levels\].
@@ -105,12 +106,13 @@ pub(super) fn fit(
     };
     let evaluate = |x: &Parameters, is_sharp: bool| {
         let mut sums = Sums::at(patch, x, window.bend.map(|c| c as f32), profile);
-        // Sharp edges along the pixels may say nothing about a small change of the blur.
+        // Sharp edges along the pixels may not depend on a small change of the blur.
         sums.normal[(BLUR, BLUR)] += ROUNDING / (SMALL_BLUR_PX * SMALL_BLUR_PX);
         if let Some(light) = light {
             sums.expect(x, light);
         }
-        // No image is sharper than its pixels, and samples of a Gaussian tell none that is narrower: a blur that would go below stays where it is.
+        // No image is sharper than its pixels, and samples of a Gaussian do not resolve a narrower one: a blur that would go below
+        // stays where it is.
         if x[BLUR] <= least_blur && (is_sharp || sums.gradient[BLUR] > 0.0) {
             sums.hold(BLUR);
         }
@@ -126,21 +128,21 @@ pub(super) fn fit(
         let mut candidate = x - step;
         candidate[BLUR] = candidate[BLUR].clamp(least_blur_after(x[BLUR], profile), MAX_BLUR_PX);
         let gain = step.dot(&sums.gradient);
-        // A step cut short by the damping is no sign of the end.
+        // A step shortened by the damping does not show the end.
         let is_last = step[0].hypot(step[1]) < converged_px || left_px(&x, &step) < LEFT_PART * sums.least_sd_px(gain);
         let ends = damping < 1e-2 && is_last && gain < LAST_GAIN * sums.cost;
         if ends {
-            // What the linear model says is left is as good as another look.
+            // The remaining misfit by the linear model is as good as another evaluation.
             sums.misfit = (sums.misfit - gain).max(0.0);
             return finished(window, &candidate, &sums);
         }
         let next = evaluate(&candidate, is_sharp);
-        // Single precision of the sums is no reason to go on.
+        // Differences within the single precision of the sums do not justify another step.
         if next.cost <= sums.cost * (1.0 + 1e-6) {
             (x, sums) = (candidate, next);
             damping *= 0.1;
         } else if !is_sharp && x[BLUR] <= least_blur {
-            // Without blur the profile has kinks, about which a derivative by the blur says little.
+            // Without blur the profile has kinks, where a derivative by the blur is of little use.
             is_sharp = true;
             sums.hold(BLUR);
         } else {
@@ -200,7 +202,7 @@ struct Sums {
     /// What is minimised, with what is expected of the light; and without.
     cost: f64,
     misfit: f64,
-    /// Pixels that say something.
+    /// Number of pixels with information.
     count: f64,
     normal: SMatrix<f64, FREE, FREE>,
     gradient: Parameters,
@@ -232,7 +234,7 @@ impl Sums {
         lanes.total(TOGETHER)
     }
 
-    /// The damped Gauss–Newton step; `None` when the pixels do not tell the parameters apart.
+    /// The damped Gauss–Newton step; `None` when the pixels do not determine the parameters.
     fn step(&self, damping: f64) -> Option<Parameters> {
         let mut damped = self.normal;
         for i in 0..FREE {
@@ -297,7 +299,7 @@ struct Model {
     contrast: f32,
 }
 
-/// What the pixels of a group say.
+/// Equations of a group of pixels.
 struct Rows {
     by: [[f32; LANES]; FREE],
     residuals: [f32; LANES],

@@ -18,7 +18,7 @@ struct Errors {
 const DIRECTIONS: [[f64; 2]; 7] =
     [[0.0, 90.0], [90.0, 180.0], [1.0, 91.0], [22.0, 112.0], [45.0, 135.0], [20.0, 80.0], [150.0, 30.0]];
 
-/// Corners within a pixel and beside it.
+/// Corners at places within a pixel.
 fn corners() -> impl Iterator<Item = Vector2<f64>> {
     (0..19).flat_map(|i| (0..19).map(move |j| Vector2::new(f64::from(i), f64::from(j)) * 0.13 - Vector2::repeat(1.177)))
 }
@@ -90,7 +90,7 @@ fn without_blur_a_pixel_sees_the_area_of_the_squares_in_it() {
         }
     }
     // The least blur of the lens and the least width of a box, 0.01 px each, take that much where an edge along the pixels
-    // lies on the border of one.
+    // is on the border of one.
     assert!(worst < 0.012, "{worst}");
 }
 
@@ -125,7 +125,7 @@ fn derivatives_of_a_pixel_are_those_of_its_value() {
                     let mut step = Parameters::zeros();
                     step[i] = STEP;
                     let slope = (modelled(&(x + step)).0 - modelled(&(x - step)).0) / (2.0 * STEP);
-                    // That the boxes across an edge change with its direction is left out of the derivative.
+                    // The derivative neglects that the boxes across an edge change with its direction.
                     let allowed = if i == 4 || i == 5 { 0.06 } else { 0.03 } * CONTRAST;
                     let off = (slope - by[i]).abs();
                     assert!(off < allowed, "lens {lens}, {directions:?}, {corner:?}, by {i}: {slope} and {}", by[i]);

@@ -13,7 +13,7 @@ use handeye_geometry::progress::CancelToken;
 pub(super) struct Grown {
     /// In rows of the board's columns, pixels of the level.
     pub points: Vec<Vector2<f64>>,
-    /// Whether a saddle was seen there; the other points are where the grid says.
+    /// Whether a saddle was seen there; the other points are from the grid.
     pub seen: Vec<bool>,
 }
 
@@ -30,12 +30,12 @@ const OFF_EDGE: f64 = 0.42;
 /// Part of the points that must be seen, in all and in every line: dirt and glare hide single ones.
 pub(super) const MIN_SEEN: f64 = 0.85;
 const MIN_SEEN_IN_LINE: f64 = 0.6;
-/// A line beyond the board of which more than this part is seen makes it another board; less is clutter beside it.
+/// A line beyond the board of which more than this part is seen makes it another board; less is clutter next to it.
 const MAX_BEYOND: f64 = 0.6;
 /// Bins of the search for neighbours \[px of the level\].
 const BIN_PX: f64 = 8.0;
 
-/// Points along the shorter side of the smallest grid that is taken for one.
+/// Points along the shorter side of the smallest grid that counts as one.
 const LEAST_SIDE: i32 = 3;
 
 type Node = (i32, i32);
@@ -74,7 +74,7 @@ pub(super) fn grow(
     Ok(None)
 }
 
-/// Points of the largest grid among the candidates along its sides, whatever grid is looked for; `None` where no grid has
+/// Points of the largest grid among the candidates along its sides, whatever grid is searched; `None` where no grid has
 /// three by three.
 pub(super) fn largest(
     saddles: &[Saddle],
@@ -104,7 +104,7 @@ pub(super) fn largest(
 struct Bins {
     columns: usize,
     rows: usize,
-    /// Where each bin begins in `members`.
+    /// Start of each bin in `members`.
     starts: Vec<u32>,
     members: Vec<u32>,
 }
@@ -252,7 +252,7 @@ impl<'a> Lattice<'a> {
         if from.off_edge(&step) > OFF_EDGE {
             return None;
         }
-        // The dark squares change sides from one corner to the next; the bisector of both edges tells.
+        // The dark squares change sides from one corner to the next; the bisector of both edges decides.
         let across = from.edges[0] + from.edges[1];
         let dark = from.is_dark(&across);
         let mut best = (near, None);
@@ -293,7 +293,7 @@ impl<'a> Lattice<'a> {
         (enough && self.is_whole(&window)).then(|| self.points(&window, columns)).flatten()
     }
 
-    /// Sides of what is left when lines that are mostly missing are taken off its rim; `None` below three by three.
+    /// Sides of the rest when lines that are mostly missing are removed from its rim; `None` below three by three.
     fn whole_part(&self) -> Option<(usize, usize)> {
         let (low, high) = self.bounds();
         let mut window = Window { x: low.0, y: low.1, width: high.0 - low.0 + 1, height: high.1 - low.1 + 1 };

@@ -7,10 +7,10 @@
 //!
 //! `T(σ) = 4 φ(h) φ(k) (ρ + ρ²/2 h k + ρ³/6 (h² − 1)(k² − 1))`, `h = s₁/σ`, `k = s₂/σ`
 //!
-//! is to be added. A pixel's area is not round besides. Without blur the mean is the area `A` of the quadrants, in closed
-//! form, and what is left is `A − E₁ E₂ − T`. Blur takes it away with the sixth power of `σ`: the leading term of its
-//! Edgeworth series, `κ₂₂ φ'(h) φ'(k) / σ⁴`, has that at the corner. The sum is exact for no blur; for edges that cross
-//! at 60° or more, the rest is at the most 2 % of the contrast at any blur.
+//! is to be added. In addition, a pixel's area is not round. Without blur the mean is the area `A` of the quadrants, in
+//! closed form, and the remainder is `A − E₁ E₂ − T`. Blur reduces it with the sixth power of `σ`: the leading term of
+//! its Edgeworth series, `κ₂₂ φ'(h) φ'(k) / σ⁴`, has that at the corner. The sum is exact for no blur; for edges that
+//! cross at 60° or more, the rest is at most 2 % of the contrast at any blur.
 
 use super::edge::{Boxes, PIXEL_AREA, Place, erf_and_slope};
 use super::patch::{Group, LANES};
@@ -28,15 +28,15 @@ pub(super) struct Meeting {
     /// Cosine of the angle between the edges, and its sine with a sign.
     correlation: f32,
     turn: f32,
-    /// How much of the part that is not Gaussian is left by the blur.
+    /// Share of the part that is not Gaussian that the blur leaves.
     share: f32,
     boxes: [Boxes; 2],
 }
 
-/// What is to be added to the product of both edges, and its derivatives.
+/// The term to be added to the product of both edges, and its derivatives.
 pub(super) struct Extra {
     pub value: [f32; LANES],
-    /// By the corner (2), by the directions of the edges (2), by the blur.
+    /// Derivatives by the corner (2), by the directions of the edges (2), by the blur.
     pub by: [[f32; LANES]; 5],
 }
 
@@ -135,7 +135,7 @@ impl Meeting {
     }
 }
 
-/// Of an edge within the pixel at `(dx, dy)` from the corner: the length beyond the corner less the one before it, and
+/// For an edge within the pixel at `(dx, dy)` from the corner: the length beyond the corner less the one before it, and
 /// the same for the first moment of the length.
 #[inline]
 fn chord(dx: f32, dy: f32, t: [f32; 2]) -> (f32, f32) {

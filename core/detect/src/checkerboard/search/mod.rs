@@ -3,8 +3,8 @@
 //! 1. [`saddles`]: on a pyramid of halved images, coarse first, points where the image curves up one way and down the
 //!    other, with four alternating sectors on a ring around them;
 //! 2. [`lattice`]: from a saddle with four neighbours the grid grows by prediction, step by step;
-//! 3. [`board`]: the image around every corner is fitted ([`fit`]), with what the neighbours say about the bend of
-//!    the edges and the fall of the light.
+//! 3. [`board`]: the image around every corner is fitted ([`fit`]), with what the neighbours show about the bend of the
+//!    edges and the fall of the light.
 
 mod board;
 mod edge;
@@ -24,15 +24,15 @@ use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::Grid;
 use pyramid::Level;
 
-/// Least squares for which a level is looked at, in its pixels, if the board fills the image: twice what it can see.
+/// Smallest squares for which a level is searched, in its pixels, if the board fills the image: twice what it can see.
 const LEVEL_SQUARE_PX: f64 = 10.0;
-/// Least part of the corners that are fitted on a board of which some are hidden: as many as must be seen.
+/// Smallest part of the corners that are fitted on a board of which some are hidden: as many as must be seen.
 const LEAST_FITTED: f64 = lattice::MIN_SEEN;
 /// Standard deviation per axis of a hidden corner as a part of the distance to its nearest neighbour: the most by which
 /// perspective changes a step from one square to the next.
 const HIDDEN_PART: f64 = 0.1;
 
-/// What a search came to.
+/// Result of a search.
 #[derive(Debug)]
 pub(crate) struct Search {
     /// The board's inner corners in some order, refined; `None` when it is not seen.
@@ -70,7 +70,7 @@ pub(crate) fn find(image: &GrayImage, grid: &Grid, cancel: &CancelToken) -> Resu
     Ok(Search { board: partly.and_then(Hidden::stated), fitted_levels })
 }
 
-/// Sides of the largest grid of corners in sight, whatever its size, on the levels where `grid` is looked for; `None` where
+/// Sides of the largest grid of corners in sight, whatever its size, on the levels where `grid` is searched; `None` where
 /// no grid has three by three.
 pub(crate) fn largest(
     image: &GrayImage,
@@ -85,7 +85,7 @@ pub(crate) fn largest(
     Ok(best)
 }
 
-/// A board with corners that neither a saddle nor a fit speaks for: only the grid does.
+/// A board with corners that are supported by neither a saddle nor a fit: only by the grid.
 struct Hidden {
     board: Ordered,
     corners: Vec<usize>,
@@ -134,7 +134,7 @@ fn between_neighbours(board: &Ordered, column: usize, row: usize) -> Option<Vect
     }
 }
 
-/// The coarsest level in which a board that fills the image still has squares of the least size.
+/// The coarsest level in which a board that fills the image still has squares of the smallest size.
 fn coarsest(image: &GrayImage, grid: &Grid) -> usize {
     let (width, height) = (f64::from(image.width()), f64::from(image.height()));
     let (long, short) = (grid.columns.max(grid.rows) as f64, grid.columns.min(grid.rows) as f64);

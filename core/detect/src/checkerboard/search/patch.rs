@@ -7,7 +7,7 @@ use super::pyramid::Level;
 /// Parameters of the model of a corner: corner (2), gradient of the light (2), directions of the edges (2), blur, level,
 /// contrast.
 pub(super) const FREE: usize = 9;
-/// Where the blur is among them.
+/// Index of the blur.
 pub(super) const BLUR: usize = 6;
 /// Their values.
 pub(super) type Parameters = SVector<f64, FREE>;
@@ -17,7 +17,7 @@ pub(super) const LANES: usize = 32;
 /// Pixels needed for the nine parameters.
 const MIN_PIXELS: usize = 16;
 
-/// Where a corner is thought to be, and what of its image counts.
+/// Assumed place of a corner, and the part of the image that is used.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Window {
     pub centre: Vector2<f64>,
@@ -39,7 +39,7 @@ pub(super) struct Window {
 pub(super) struct Patch {
     /// Those with pixels that see both edges, among others, come first.
     pub groups: Vec<Group>,
-    /// How many do.
+    /// Number of those.
     both: usize,
 }
 
@@ -74,7 +74,7 @@ impl Pixels {
     }
 }
 
-/// Where on a row of the image something is so; empty where the ends are the wrong way round.
+/// The part of a row of the image in which a condition holds; empty where the ends are in the wrong order.
 #[derive(Debug, Clone, Copy)]
 struct Span {
     from: f64,

@@ -35,7 +35,7 @@ impl Saddle {
 
 /// Pixels at the border without a response: two for the second differences, one for the box.
 const BORDER: usize = 4;
-/// Pixels that are looked at together.
+/// Pixels that are processed together.
 const CHUNK: usize = 16;
 /// Responses are stored in units of this power of two, so that the largest fits 16 bits.
 const RESPONSE_SHIFT: u32 = 6;

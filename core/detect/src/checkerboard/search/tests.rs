@@ -15,7 +15,7 @@ fn rough(truth: &[Vector2<f64>]) -> Ordered {
     Ordered::new(truth.iter().map(|p| p.map(f64::round)).collect(), &Grid { columns: 10, rows: 7, square_m: 0.015 })
 }
 
-/// The search as it is when nobody cancels it.
+/// The search without cancelling.
 fn find(image: &GrayImage, grid: &Grid) -> Search {
     super::find(image, grid, &CancelToken::default()).expect("is not cancelled")
 }
@@ -76,8 +76,8 @@ fn compare(views: u64, blur_px: f64, noise: f64) -> [Errors; 2] {
     errors
 }
 
-/// A view of the published scene through a lens with a blur of any size. A blur below a pixel is none of whole pixels: it
-/// is rendered finer and put together.
+/// A view of the published scene through a lens with a blur of any size. A blur below a pixel cannot be made from whole
+/// pixels: the view is rendered finer and averaged.
 fn through_a_lens(scene: &Scene, seed: u64) -> GrayImage {
     const FINER: u32 = 3;
     if scene.blur_px == 0.0 || scene.blur_px >= 0.7 {
@@ -203,7 +203,7 @@ fn no_corner_is_fitted_where_no_lattice_has_the_size_of_the_board() {
         let search = find(&image, &Grid { rows: 8, ..BOARD });
         assert!(search.board.is_none() && search.fitted_levels == 0, "{name}: {search:?}");
     }
-    // Where there is one, the first level that shows it is enough.
+    // Where there is a board, the first level that shows it is enough.
     assert_eq!(find(&view(1, |_| {}).0, &BOARD).fitted_levels, 1);
 }
 
@@ -231,7 +231,7 @@ fn a_hidden_corner_lies_between_its_neighbours_and_says_how_little_is_known_of_i
     let mut partly = board.clone();
     for index in hidden {
         (seen[index], partly.covariances_px2[index]) = (false, None);
-        // Where a lattice on a coarser level may put it.
+        // Where a lattice on a coarser level may place it.
         partly.points[index] += Vector2::new(1.5, -1.0);
     }
     let stated = Hidden::of(partly.clone(), &seen).stated().expect("enough is left");
@@ -331,7 +331,7 @@ mod slow {
             let rms = errors.rms();
             let case = format!("lens {lens} px, {off_deg}° off, leaning {leaning_deg}°, noise {noise}");
             println!("{case}: rms {rms:.4}, worst {:.3}", errors.worst());
-            // A single corner whose fit has not got to its end is off by 0.05 px.
+            // A single corner whose fit has not converged has an error of 0.05 px.
             assert!(rms < allowed && errors.worst() < 5.0 * allowed, "{case}: {rms}, {}", errors.worst());
         }
     }
@@ -357,8 +357,8 @@ mod slow {
             }
             let normalised = f64::sqrt(sum / count);
             println!("blur {blur} noise {noise}: normalised {normalised:.3}");
-            // Of 420 numbers the root mean square of a unit normal is known to 0.035: three of these, and as much for the
-            // part of the image that the model does not have.
+            // For 420 numbers the root mean square of a unit normal is known to 0.035: three of these, and as much for
+            // the part of the image that the model does not have.
             assert!((normalised - 1.0).abs() < 0.2, "blur {blur} noise {noise}: {normalised}");
         }
     }

@@ -1,4 +1,4 @@
-//! What a hypothesis does to the views: its columns in the linear model.
+//! The effect of a hypothesis on the views: its columns in the linear model.
 
 use std::ops::Range;
 
@@ -17,7 +17,7 @@ pub(super) enum Effect {
     /// The intrinsics given are wrong: all parameters of the lens.
     Lens,
     /// The centre of the intrinsics given is wrong: two pixels. Of the lens it is what the images show least and what other
-    /// programs count in another way; by itself it stands out where all parameters together do not.
+    /// programs count in another way; alone it is significant where all parameters together are not.
     Centre,
     /// The target moved on its carrier before this view: a twist in the target's frame.
     BoardMoved(usize),
@@ -31,7 +31,7 @@ pub(super) enum Effect {
 const CENTRE: Range<usize> = 2..4;
 
 impl Effect {
-    /// Whether it says that the intrinsics given are wrong.
+    /// Whether it is an error of the given intrinsics.
     pub fn is_of_lens(self) -> bool {
         matches!(self, Self::Lens | Self::Centre)
     }
@@ -56,7 +56,7 @@ impl Effect {
         }
     }
 
-    /// How the residual of a view turns with its numbers.
+    /// Jacobian of the residual of a view with respect to its numbers.
     pub fn columns(self, model: &Model<'_>, view: usize) -> DMatrix<f64> {
         let (row, seen) = (&model.rows[view], &model.sight.views[view]);
         let lens = model.sight.lens_count();
@@ -64,7 +64,7 @@ impl Effect {
             if moved { DMatrix::from_iterator(6, 6, matrix.iter().copied()) } else { DMatrix::zeros(6, 6) }
         };
         match self {
-            // A target that is larger stands so much farther away; its pose was seen too near.
+            // A larger target is farther away by the same factor; its pose was measured too near.
             Self::Scale => {
                 let pose = &seen.camera_from_target;
                 let along = pose.rotation.inverse() * pose.translation.vector;

@@ -15,7 +15,7 @@ use crate::handeye::{HandEyeError, PosePair};
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_geometry::progress::Work;
 
-/// Views that are looked at: enough for any gross fault.
+/// Most views that are used: enough for any gross fault.
 const MOST_VIEWS: usize = 24;
 /// Hypotheses within this factor of the best count as equal; the simplest of them is taken.
 const TIE: f64 = 1.5;
@@ -41,8 +41,8 @@ const WXYZ: (RotationForm, AngleUnit) = (RotationForm::Wxyz, AngleUnit::Radian);
 /// The order of quaternions.
 const ORDERS: [Misread; 2] = [misread([XYZW, WXYZ]), misread([WXYZ, XYZW])];
 
-/// Rotation vectors, and roll, pitch and yaw, in radians that were read as degrees. The other way round the table is refused:
-/// degrees are soon more than the two turns that a controller reports.
+/// Rotation vectors, and roll, pitch and yaw, in radians that were read as degrees. The reverse case is refused on reading:
+/// degrees soon exceed the two turns that a controller reports.
 const ANGLES: [Misread; 2] = [radians(RotationForm::Vector), radians(RotationForm::Euler(Euler::RPY))];
 
 const fn radians(form: RotationForm) -> Misread {
@@ -52,7 +52,8 @@ const fn radians(form: RotationForm) -> Misread {
 /// Turns of radians that were read as degrees are no larger, radians: three angles of half a turn each.
 const LARGEST_OF_DEGREES: f64 = 3.0 * std::f64::consts::PI * std::f64::consts::PI / 180.0;
 
-/// Factors by which lengths of different units differ, besides the thousand: powers of ten, and the millimetres and metres of an inch.
+/// Factors by which lengths of different units differ, other than a thousand: powers of ten, and the millimetres and metres of an
+/// inch.
 const OTHER_UNITS: [f64; 8] = [0.1, 10.0, 1e-2, 1e2, 25.4, 1.0 / 25.4, 0.0254, 1.0 / 0.0254];
 
 /// A change of the reported poses.
@@ -69,7 +70,7 @@ pub(super) struct Change {
 impl Change {
     pub const NONE: Self = Self { direction: Direction::Forward, misread: None, unit: 1.0, pairing: Pairing::AsGiven };
 
-    /// What is said of the poses, the gravest first: one code for each thing changed.
+    /// What is wrong with the poses, the gravest first: one code for each thing changed.
     pub fn codes(&self) -> Vec<FindingCode> {
         let of_rotations = |misread: Misread| {
             let is_angles = misread.meant.rotation.has_angles();
@@ -159,13 +160,13 @@ pub(super) struct Tried {
 
 /// What was tried.
 pub(super) struct Gross {
-    /// The poses as they are.
+    /// The poses as given.
     pub as_given: Result<Agreement, HandEyeError>,
     /// The changes, the best first.
     pub tried: Vec<Tried>,
-    /// Whether the first of them explains the data and the poses as they are do not.
+    /// Whether the first of them explains the data while the poses as given do not.
     pub accused: bool,
-    /// Views looked at.
+    /// Number of views used.
     pub views: usize,
 }
 
@@ -185,13 +186,13 @@ pub(super) fn gross(sight: &SessionViews, work: &Work<'_>) -> Option<Gross> {
     let mut tried: Vec<Tried> = found.into_iter().filter_map(of).collect();
     let misfit = |tried: &Tried| tried.agreement.median_m / distance_m;
     sort_by_misfit(&mut tried, TIE, misfit, |tried| tried.change.codes().len());
-    // What was stated stays until it is ruled out.
+    // The stated conventions are kept until they are ruled out.
     let score = |misfit: f64, explains: bool| Score { misfit, views, explains };
     let mut accused = given >= CLEAR
         && tried.first().map(misfit).is_some_and(|best| {
             hypotheses::verdict(&[score(best, best < EXPLAINED), score(given, true)]) == Verdict::Decided
         });
-    // Half of the views may be in step and the other half not: the median says nothing of the rest.
+    // Half of the views may be in step and the other half not: the median shows nothing about the rest.
     if !accused && let Some(stepped) = stepped(sight, as_given.as_ref().ok()) {
         tried.insert(0, stepped);
         accused = true;
@@ -199,7 +200,7 @@ pub(super) fn gross(sight: &SessionViews, work: &Work<'_>) -> Option<Gross> {
     Some(Gross { as_given, tried, accused, views })
 }
 
-/// A step in the pairing of images and poses that explains what the poses as they are leave; `None` when there is none.
+/// A step in the pairing of images and poses that explains what the poses as given do not; `None` when there is none.
 fn stepped(sight: &SessionViews, as_given: Option<&Agreement>) -> Option<Tried> {
     let wrong_m = CLEAR * sight.target.distance_m;
     let paired = |pairing: Pairing| Changed::new(sight, Change { pairing, ..Change::NONE });
@@ -250,7 +251,7 @@ mod tests {
         }
     }
 
-    /// A step explains what it repairs, not what the solution beside it happens to suit better.
+    /// A step explains the views that it repairs, not others that its solution happens to suit better.
     #[test]
     fn a_step_is_believed_by_the_views_that_it_pairs_anew() {
         let healthy = SessionViews::new(&observed(&Setup::new(Mode::EyeInHand, 14, 71)), None).expect("views");

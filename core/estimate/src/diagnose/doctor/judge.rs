@@ -11,7 +11,7 @@ use crate::size::{FALSE_ALARM as ALPHA, LEAST_SCALE};
 use crate::uncertainty::quality::BY_CHANCE;
 use handeye_geometry::statistics::{better_by_chance, outliers};
 
-/// Parts that views are left out in, one at a time; as for the held-out error of a calibration.
+/// Parts into which views are split, left out one at a time as for the held-out error of a calibration.
 const FOLDS: usize = 5;
 /// Two explanations count as equally good when the noise that they leave the robot, position times orientation, differs by
 /// less than this factor: it is known to a quarter or so in a session of ten views.
@@ -28,7 +28,7 @@ const LEAST_MOVED_M: f64 = 2e-4;
 /// Zero of a joint, radians: two hundredths of a degree, about what controllers are calibrated to.
 const LEAST_JOINT_RAD: f64 = 3.5e-4;
 
-/// A hypothesis and what it does.
+/// A hypothesis and the result of its test.
 pub(super) struct Judged {
     pub candidate: Candidate,
     /// Its numbers, and one standard deviation of each; empty for views.
@@ -43,7 +43,7 @@ pub(super) struct Judged {
     pub matters: bool,
     /// Logarithm of the number of alternatives among which it is the best.
     ln_alternatives: f64,
-    /// Whether it stands beside the one that was taken in first: the robot's poses cannot tell the two apart.
+    /// Whether it is as good as the one that was taken in first: the robot's poses cannot tell the two apart.
     pub as_good: bool,
     /// Prediction of held-out views without and with it.
     pub held_out: Option<(HeldOut, HeldOut)>,
@@ -57,16 +57,16 @@ pub(super) struct Judged {
 pub(super) struct HeldOut {
     /// Displacement of the board, RMS, metres.
     pub rms_m: f64,
-    /// Of every view: logarithm of its predictive likelihood, but for a constant.
+    /// For every view the logarithm of its predictive likelihood, up to a constant.
     scores: Vec<f64>,
 }
 
 impl HeldOut {
     /// Whether views are predicted better than by another model, by more than chance: a test of the signed ranks of the gains,
-    /// with an allowance for the alternatives. It is asked for besides [`ALPHA`], whose law of the noise may be wrong.
-    /// Without an effect a gain is as likely a loss of that size, whatever the law of the noise. With one, a few views
-    /// gain most; a test of the mean against their scatter never gets beyond `√views` over the relative scatter, however large
-    /// the effect.
+    /// with an allowance for the alternatives. It is required in addition to [`ALPHA`], whose distribution of the noise may be
+    /// wrong. Without an effect a gain is as likely a loss of that size, whatever the distribution of the noise. With one, a
+    /// few views gain most; a test of the mean against their scatter never gets beyond `√views` over the relative scatter,
+    /// however large the effect.
     fn is_better_than(&self, other: &Self, ln_alternatives: f64) -> bool {
         let gains: Vec<f64> = self.scores.iter().zip(&other.scores).map(|(with, without)| with - without).collect();
         better_by_chance(&gains) * ln_alternatives.exp() < BY_CHANCE
@@ -74,12 +74,13 @@ impl HeldOut {
 }
 
 impl Judged {
-    /// Whether it is to be taken in.
+    /// Whether it is accepted.
     pub fn holds(&self) -> bool {
         let held_out = match (&self.candidate, &self.held_out) {
-            // Corners say it themselves, each of hundreds; views are left out, not modelled.
+            // Hundreds of corners show it directly; views are left out, not modelled.
             (Candidate::Effect(Effect::Warp | Effect::Lens | Effect::Centre) | Candidate::Views(_), _) => true,
-            // Errors of the arm predict what a size or a zero does as well as these do; what is likelier is another question.
+            // Errors of the arm predict what a size or a zero does as well as these do; which is likelier is another
+            // question.
             (Candidate::Effect(Effect::Scale | Effect::Joint(_)), _) if self.fit.has_arm() => true,
             (Candidate::Effect(_), None) => false,
             (Candidate::Effect(_), Some((without, with))) => with.is_better_than(without, self.ln_alternatives),
@@ -93,7 +94,7 @@ impl Judged {
     pub fn explains_as_much_as(&self, other: &Self) -> bool {
         let effects = |j: &Self| matches!(j.candidate, Candidate::Effect(_));
         let left = |j: &Self| j.robot[0].1 * j.robot[1].1;
-        // The robot may hide what the corners decide: an explanation that the data contradict is none.
+        // The robot may hide what the corners decide: an explanation that the data contradict is not valid.
         let contradicted = other.gain - self.gain > -ALPHA.ln();
         effects(self)
             && effects(other)
@@ -104,7 +105,7 @@ impl Judged {
     }
 }
 
-/// A hypothesis fitted and tested. What is asked of it besides, which takes most of the work, is for [`confirm`].
+/// A hypothesis fitted and tested. The remaining conditions, which take most of the work, are for [`confirm`].
 pub(super) fn judge(model: &Model<'_>, state: &State, before: &Fit, candidate: Candidate) -> Option<Judged> {
     let mut next = state.clone();
     let lens = model.sight.lens_count();
@@ -170,7 +171,7 @@ pub(super) fn confirm(model: &Model<'_>, before: &Fit, judged: &mut Judged) {
     };
 }
 
-/// Whether an effect is significant beside errors of the arm in the axes of its base, too.
+/// Whether an effect is still significant with errors of the arm in the axes of its base in the model, too.
 fn is_more_than_a_field(model: &Model<'_>, judged: &Judged, effect: Effect) -> bool {
     let Some(model) = model.with_field_in_base() else { return true };
     let Some(fit) = model.fit(&judged.state, judged.fit.levels) else { return false };
@@ -179,12 +180,12 @@ fn is_more_than_a_field(model: &Model<'_>, judged: &Judged, effect: Effect) -> b
     fit.wald(at, count).is_some_and(|wald| is_significant(wald, count, fit.freedom(at, count), judged.ln_alternatives))
 }
 
-/// Degrees of freedom of that view whose expectation rests on the fewest.
+/// Degrees of freedom of the view whose expectation rests on the fewest.
 fn least_freedom(fit: &Fit, views: &[usize]) -> Option<f64> {
     views.iter().map(|view| fit.freedom_of_view(*view)).try_fold(f64::INFINITY, |least, of| Some(least.min(of?)))
 }
 
-/// Whether each of these views is an outlier among all of them, by a fit that is without.
+/// Whether each of these views is an outlier among all of them, by a fit without them.
 fn stand_apart(judged: &Judged, views: &[usize]) -> bool {
     let fit = &judged.fit;
     let squared = |view: usize| {

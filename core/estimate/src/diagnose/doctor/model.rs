@@ -46,8 +46,8 @@ const LARGEST_STEP: f64 = 2.0;
 const MAX_STEPS: usize = 25;
 /// Relative change of both variances that ends the search.
 const SETTLED: f64 = 1e-2;
-/// Slopes of the field that the data have to determine, together, for there to be one. It then explains about as much as
-/// a tenth of one more unknown would.
+/// Number of slopes of the field that the data have to determine, in sum, for a field to be in the model. It then
+/// explains about as much as a tenth of one more unknown would.
 const LEAST_DETERMINED: f64 = 0.1;
 /// Information on the logarithm of a variance of random effects below which it changes nothing: they then stand out of
 /// the noise by a thirtieth.
@@ -59,7 +59,7 @@ pub(super) struct Row {
     pub error: Vector6<f64>,
     pub by_hand_eye: Matrix6<f64>,
     pub by_robot: Matrix6<f64>,
-    /// How the residual turns with the errors of the arm; no columns where they are not in the model.
+    /// Jacobian of the residual with respect to the errors of the arm; no columns where they are not in the model.
     by_arm: DMatrix<f64>,
     camera: Matrix6<f64>,
     robot: [Matrix6<f64>; 2],
@@ -70,14 +70,14 @@ pub(super) struct Model<'a> {
     pub sight: &'a SessionViews,
     pub solution: ClosedFormSolution,
     pub rows: Vec<Row>,
-    /// Where the errors of the robot that depend on where it stands are taken, where there are any.
+    /// Places at which the pose-dependent errors of the robot are taken, where there are any.
     pub field: Option<Places>,
     /// Whether the field has a part in the axes of the base.
     in_base: bool,
     /// The arm, where its joints are known.
     arm: Option<KnownArm>,
-    /// Work that was done with it and with models that were made of it, in elements of normal equations that a view was added to:
-    /// what an examination costs, by a count that is the same on every machine.
+    /// Work done with it and with models derived from it, in elements of normal equations that a view was added to: the cost of
+    /// an examination, counted the same on every machine.
     work: Rc<Cell<u64>>,
 }
 
@@ -86,7 +86,7 @@ pub(super) struct Model<'a> {
 pub(super) struct KnownArm {
     /// The errors at which the equations are linear, without their field.
     pub errors: ArmErrors,
-    /// Whether the joint estimate, which weighs what arms and what sizes are likely, has another size of the target beside them.
+    /// Whether the joint estimate, which weighs what arms and what sizes are likely, also estimates another size of the target.
     pub beside_another_size: bool,
 }
 
@@ -99,15 +99,15 @@ impl From<&ArmFit> for KnownArm {
 /// Variances of the robot per axis, of position (m²) and of orientation (rad²).
 #[derive(Clone, Copy)]
 pub(super) struct Levels {
-    /// Of its noise, view by view.
+    /// Variances of its noise, view by view.
     pub noise: [f64; 2],
-    /// Of what depends on where it stands, at a typical place: in the axes of the tip, then in those of the base; and of the errors of
-    /// its arm, angles (rad²), lengths (m²) and compliance (rad²).
+    /// Variances of the pose-dependent error, at a typical place: in the axes of the tip, then in those of the base; and of the
+    /// errors of its arm, angles (rad²), lengths (m²) and compliance (rad²).
     pub effects: [f64; PARTS],
 }
 
 impl Levels {
-    /// With as much of a field as of noise, and an arm like others.
+    /// A field as large as the noise, and an arm like others.
     pub fn even(noise: [f64; 2]) -> Self {
         let [angle, length, compliance] = LEVELS_OF_ARMS.map(|level| level * level);
         Self { noise, effects: [noise[0], noise[1], noise[0], noise[1], angle, length, compliance] }
@@ -124,13 +124,14 @@ pub(super) struct State {
 
 /// The result of a fit.
 pub(super) struct Fit {
-    /// `[x (6), y (6), lens if free, slopes of the field if there is one, errors of the arm if it is known, numbers of the effects…]`
+    /// `[x (6), y (6), lens if free, slopes of the field if there is one, errors of the arm if it is known, numbers of the
+    /// effects…]`
     pub theta: DVector<f64>,
     pub covariance: DMatrix<f64>,
     pub levels: Levels,
     /// Unknowns that the data determine: a random effect that follows its prior counts for less than one.
     pub determined: f64,
-    /// Residual of every view, those aside included.
+    /// Residual of every view, outliers included.
     pub residuals: Vec<Vector6<f64>>,
     pub weights: Vec<Matrix6<f64>>,
     /// Columns per view.
@@ -142,7 +143,7 @@ pub(super) struct Fit {
 }
 
 impl<'a> Model<'a> {
-    /// With the errors of the arm, where they are known, at which its equations are linear.
+    /// The model of the views, with its equations linear at the errors of the arm where these are known.
     pub fn new(
         sight: &'a SessionViews,
         solution: ClosedFormSolution,
@@ -187,11 +188,11 @@ impl<'a> Model<'a> {
         Self { sight, solution, rows, field, in_base: false, arm, work: Rc::default() }
     }
 
-    /// The same with a field that has a part in the axes of the base, too; `None` where there is none to be had.
+    /// The same with a field that has a part in the axes of the base, too; `None` where the views do not allow one.
     ///
-    /// What is wrong near the wrist turns with the tip. What is wrong near the base does not: links that are too long make the
-    /// arm move too far, which a field in the axes of the tip cannot follow where the tip turns, and looks like another
-    /// size of the target, or like a move. An effect beside both parts is more than that.
+    /// Errors near the wrist turn with the tip. Errors near the base do not: links that are too long make the arm move too
+    /// far, which a field in the axes of the tip cannot follow where the tip turns, and looks like another size of the target,
+    /// or like a move. An effect that is significant beyond both parts is more than that.
     pub fn with_field_in_base(&self) -> Option<Self> {
         let field = Places::for_field(self.sight.views.iter().map(|view| &view.base_from_tip))?;
         let (rows, arm, work) = (self.rows.clone(), self.arm.clone(), Rc::clone(&self.work));
@@ -213,7 +214,7 @@ impl<'a> Model<'a> {
         Self { work: Rc::clone(&self.work), ..Self::new(self.sight, solution, self.field, arm) }
     }
 
-    /// Takes account of normal equations of so many unknowns that every view was added to.
+    /// Counts the work of normal equations of this many unknowns that every view was added to.
     pub fn count_work(&self, width: usize) {
         self.work.set(self.work.get() + (self.rows.len() * width * width) as u64);
     }
@@ -253,7 +254,7 @@ impl<'a> Model<'a> {
         self.effects_at() - self.field_at()
     }
 
-    /// Whether a fit found that errors depend on where the robot stands: the data determine a part of the slopes.
+    /// Whether a fit found that errors depend on the robot's pose: the data determine a part of the slopes.
     pub fn has_field(&self, fit: &Fit) -> bool {
         let of_field = self.parts().into_iter().zip(fit.levels.effects).take(FIELD_PARTS);
         let determined = |(part, level): (Range<usize>, f64)| {
@@ -316,7 +317,7 @@ impl<'a> Model<'a> {
         places
     }
 
-    /// Adds what the corners say of lens and warp apart from the poses.
+    /// Adds the information of the corners on lens and warp apart from the poses.
     fn add_form(&self, state: &State, normal: &mut DMatrix<f64>, right: &mut DVector<f64>) {
         let places = self.form_places(state);
         for &(i, a) in &places {
@@ -424,13 +425,13 @@ impl<'a> Model<'a> {
             }
         }
         for k in 0..PARTS {
-            // What does not show beside the noise is none.
+            // An effect that does not show beyond the noise counts as zero.
             if information[(k, k)] < NO_EFFECT {
                 information.fill_row(k, 0.0);
                 information.fill_column(k, 0.0);
                 (gradient[k], information[(k, k)]) = (0.0, 1.0);
             }
-            // Axes of tip and base are the same where the tip hardly turns: nothing then tells which it is.
+            // Axes of tip and base are the same where the tip hardly turns: the data then do not determine which it is.
             information[(k, k)] *= 1.0 + 1e-3;
         }
         let step = information.try_inverse().map_or_else(|| gradient * 0.0, |inverse| inverse * gradient);
@@ -492,7 +493,7 @@ struct Solution {
     theta: DVector<f64>,
 }
 
-/// The pose seen, or its mirrored twin where the corners cannot tell and the chain can.
+/// The pose seen, or its mirrored twin where the corners do not distinguish them and the chain does.
 fn nearer(
     sight: &SessionViews,
     view: &super::views::SessionView,
@@ -516,7 +517,7 @@ pub(super) fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         return None;
     }
     let cholesky = scaled.cholesky()?;
-    // Of unit diagonal, so a pivot near the rounding means that columns depend on each other.
+    // The diagonal is one, so a pivot near the rounding means that columns depend on each other.
     if cholesky.l_dirty().diagonal().min() < 1e-7 {
         return None;
     }
@@ -540,16 +541,16 @@ impl Fit {
         (0.5 * (6.0 * self.views as f64 - self.determined)).max(1.0)
     }
 
-    /// Degrees of freedom of the variance of some unknowns. What of it is due to random effects is in proportion to
-    /// their variance, which is estimated from those alone that the data determine: nine slopes in each part of a field at the most,
-    /// however many views there are. The rest is the noise's.
+    /// Degrees of freedom of the variance of some unknowns. The part due to random effects is proportional to their variance, which
+    /// is estimated only from those that the data determine: at most nine slopes in each part of a field, however many views there
+    /// are. The rest is the noise's.
     pub fn freedom(&self, at: usize, count: usize) -> f64 {
         let covariance = self.covariance.view((at, at), (count, count)).into_owned();
         let by_effects = |part: &Range<usize>| self.covariance.view((at, part.start), (count, part.len())).into_owned();
         self.pooled(&covariance, by_effects)
     }
 
-    /// The same of how far a view that is not in the fit is from what is expected of it.
+    /// The same for the distance of a view that is not in the fit from what is expected of it.
     pub fn freedom_of_view(&self, view: usize) -> Option<f64> {
         let design = &self.designs[view];
         let own = self.weights[view].try_inverse()?;
@@ -558,8 +559,8 @@ impl Fit {
         Some(self.pooled(&DMatrix::from_fn(6, 6, |i, j| own[(i, j)] + shared[(i, j)]), by_effects))
     }
 
-    /// By a covariance, and the covariance of its numbers with some of the random effects: by the log of the variance `v` of these
-    /// the covariance `C` changes by `C_s C_sᵀ / v`.
+    /// Degrees of freedom by a covariance, and the covariance of its numbers with some of the random effects: the derivative of
+    /// the covariance `C` by the log of the variance `v` of these is `C_s C_sᵀ / v`.
     fn pooled(&self, covariance: &DMatrix<f64>, by_effects: impl Fn(&Range<usize>) -> DMatrix<f64>) -> f64 {
         let Some(inverse) = inverse(covariance) else { return self.freedom_of_noise() };
         let random = self.random.iter().zip(self.levels.effects).filter(|(part, _)| !part.is_empty());
@@ -581,7 +582,7 @@ impl Fit {
         Some(theta.dot(&(information * &theta)))
     }
 
-    /// Covariance of the residuals of views that are not in the fit.
+    /// Wald's statistic of the residuals of views that are not in the fit, by their covariance.
     pub fn wald_of_views(&self, views: &[usize]) -> Option<f64> {
         let n = 6 * views.len();
         let mut covariance = DMatrix::zeros(n, n);

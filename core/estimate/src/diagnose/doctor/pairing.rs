@@ -7,11 +7,11 @@ use crate::diagnose::hypotheses::steps::{self, Step};
 /// Which row of the table an image belongs to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Pairing {
-    /// Its own.
+    /// Its own row.
     AsGiven,
-    /// The one so many rows further.
+    /// The row this many rows further.
     Shifted(isize),
-    /// The one so many rows further, differently before a view (by its place among those seen) and from it on.
+    /// The row this many rows further, differently before a view (by its place among those seen) and from it on.
     Stepped(Step),
     /// Images and poses were listed in different orders: the poses in this one, the images in the other.
     Listed(Order),

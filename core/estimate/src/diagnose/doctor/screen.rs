@@ -1,11 +1,11 @@
-//! Which hypothesis of every kind is worth a fit of its own, by tests with the noise levels at hand.
+//! Which hypothesis of every kind is worth a fit of its own, by tests with the present noise levels.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::effect::Effect;
 use super::model::{Fit, Model, State, inverse};
 
-/// Effects taken in at the most; more than two faults at once are rare.
+/// Most effects taken in; more than two faults at once are rare.
 const MOST_EFFECTS: usize = 3;
 
 /// What is tested.
@@ -16,7 +16,7 @@ pub(super) enum Candidate {
     Views(Vec<usize>),
 }
 
-/// The most promising hypothesis of every kind, by a test with the noise levels that are at hand.
+/// The most promising hypothesis of every kind, by a test with the present noise levels.
 pub(super) fn screened(model: &Model<'_>, state: &State, fit: &Fit, room: usize) -> Vec<Candidate> {
     let count = model.sight.views.len();
     let mut found: Vec<Candidate> = Vec::new();
@@ -24,7 +24,8 @@ pub(super) fn screened(model: &Model<'_>, state: &State, fit: &Fit, room: usize)
         let mut singles = vec![Effect::Scale];
         if model.sight.intrinsics.is_some() {
             singles.push(Effect::Warp);
-            // The centre is one of all parameters: beside one of the two the other has nothing left to say.
+            // The centre is one of all parameters: with one of the two in the model the other has nothing left to
+            // explain.
             if !model.sight.lens_free && !state.effects.iter().any(|effect| effect.is_of_lens()) {
                 singles.extend([Effect::Lens, Effect::Centre]);
             }
@@ -80,7 +81,8 @@ impl Score {
 
     fn statistic(&self, fit: &Fit) -> Option<f64> {
         let left = &self.own - self.shared.transpose() * &fit.covariance * &self.shared;
-        // What the other unknowns take up wholly cannot be seen: the zero of the first and of the last joint, for instance.
+        // An effect that the other unknowns fully absorb cannot be seen: the zero of the first and of the last joint, for
+        // instance.
         if (0..left.nrows()).any(|k| left[(k, k)] <= 1e-6 * self.own[(k, k)]) {
             return None;
         }

@@ -1,5 +1,5 @@
 //! Which hypotheses the data support: each is fitted with noise levels of its own, the best is taken in, and the rest are
-//! judged again beside it.
+//! judged again with it in the model.
 
 use super::effect::Effect;
 use super::judge::{Judged, confirm, judge};
@@ -16,21 +16,21 @@ use handeye_geometry::progress::Work;
 
 /// Least views: twelve unknowns, six of a hypothesis, and noise levels to judge them by.
 pub(super) const NEED: usize = 5;
-/// Outlier views at the most, as a part of all: beyond it the others are no majority to judge by.
+/// Largest part of the views that may be outliers: beyond it the others are not a reliable majority.
 const MOST_ASIDE: f64 = 0.34;
-/// A view whose misfit is so many times the median belongs to the set of views that may be left out as an outlier together. It
-/// proposes them; whether they are outliers is a matter of the test of all hypotheses.
+/// A view whose misfit is this many times the median belongs to the set of views that may be left out as an outlier together.
+/// It proposes them; whether they are outliers is a matter of the test of all hypotheses.
 const FAR: f64 = 5.0;
-/// Rounds of moving the solution to where the majority wants it; the second already changes it by a rounding.
+/// Rounds of moving the solution to where the majority puts it; the second already changes it only by rounding.
 const ROUNDS: usize = 3;
-/// Hypotheses taken in at the most, which bounds the work: one for every view that is an outlier by itself, and some more.
+/// Most hypotheses taken in, which bounds the work: one for every single outlier view, and some more.
 const MOST_TAKEN: usize = 12;
-/// Work after which no more is taken in, as [`Model::work`] counts it; a round of hypotheses beside each other may go a little
-/// beyond it, and that more is wrong is reported. One step of a fit of a hundred views with sixty unknowns is a 280th of it.
+/// Work, as counted by [`Model::work`], after which no more is taken in; one round of hypotheses may go a little beyond it,
+/// and it is reported that more is wrong. One step of a fit of a hundred views with sixty unknowns is a 280th of it.
 const MOST_WORK: u64 = 100_000_000;
 /// The same of a model that has the errors of an arm: of a hundred views with much wrong it takes 2.4 times the work.
 const MOST_WORK_WITH_ARM: u64 = 3 * MOST_WORK;
-/// Views that are tested together at the most.
+/// Most views that are tested together.
 const MOST_TOGETHER: usize = 40;
 
 /// Everything judged.
@@ -42,7 +42,7 @@ pub(super) struct Selection<'a> {
     pub model: Model<'a>,
     /// The last fit.
     pub fit: Fit,
-    /// More would have been taken in, and the work was ended.
+    /// Whether the work was ended although more would have been taken in.
     pub is_ended: bool,
 }
 
@@ -56,7 +56,7 @@ pub(super) fn select<'a>(
     arm: Option<&ArmFit>,
     work: &Work<'_>,
 ) -> Option<Selection<'a>> {
-    // The errors of an arm that is known leave nothing to a field, but where the joint estimate has one beside them.
+    // The errors of an arm that is known leave nothing to a field, except where the joint estimate has one in addition.
     let is_told_by_arm = arm.is_some_and(|arm| arm.errors.field().is_none());
     let poses = sight.views.iter().map(|view| &view.base_from_tip);
     let places = if is_told_by_arm { None } else { Places::for_field(poses) };
@@ -66,7 +66,8 @@ pub(super) fn select<'a>(
     let most_aside = (MOST_ASIDE * sight.views.len() as f64) as usize;
     let noise_m = start.median_m / 3.0;
     let mut levels = Levels::even([noise_m, noise_m / sight.target.distance_m.max(0.01)].map(|sigma| sigma.powi(2)));
-    // The majority says where the equations are made linear; with many far views there is none, and all are taken.
+    // The majority determines where the equations are made linear; with many far views there is none, and all are
+    // taken.
     let majority = State { effects: Vec::new(), aside: if far.len() <= most_aside { far.clone() } else { Vec::new() } };
     for _ in 0..ROUNDS {
         let fit = model.fit(&majority, levels)?;
@@ -94,7 +95,7 @@ pub(super) fn select<'a>(
         judged.sort_by(|a, b| b.score.total_cmp(&a.score));
         let mut best = None;
         for (i, judged) in judged.iter_mut().enumerate() {
-            // Beside others only the best is asked for; alone, all of them are listed.
+            // In the first round all are confirmed, to be listed; later only the best is needed.
             if taken.is_empty() || best.is_none() {
                 confirm(&model, &fit, judged);
                 best = best.or_else(|| judged.holds().then_some(i));
@@ -126,7 +127,7 @@ pub(super) fn select<'a>(
 }
 
 impl Selection<'_> {
-    /// Takes the size of the target from the estimate that has the errors of the arm beside it.
+    /// Takes the size of the target from the estimate that includes the errors of the arm.
     pub fn with_size_beside_arm(mut self, arm: &ArmFit) -> Self {
         let Some((scale, sigma)) = arm.shape().and_then(|shape| Some((shape.shape.scale, shape.scale_sigma?))) else {
             return self;
@@ -138,7 +139,7 @@ impl Selection<'_> {
         self
     }
 
-    /// Takes the size of the target from the joint estimate, which has bend, field and lens beside it and every corner: poses
+    /// Takes the size of the target from the joint estimate, which also has bend, field and lens and uses every corner: poses
     /// measured by a flat board, and a size that is linear in them, are wrong about it where the board is bent. What that does
     /// not show stays in the model and is not reported.
     pub fn with_size(mut self, size: &TargetSize) -> Self {
@@ -192,7 +193,7 @@ mod tests {
     use handeye_geometry::progress::CancelToken;
     use handeye_simulate::session::{Setup, observed};
 
-    /// A real session in which every fourth view is wrong, each in a way of its own and less than grossly.
+    /// A real session in which every fourth view is wrong, each in its own way, none of them grossly.
     #[test]
     fn a_session_with_much_wrong_is_examined_within_bounds_and_the_end_is_said() {
         for (views, joints) in [(40, false), (100, false), (100, true)] {

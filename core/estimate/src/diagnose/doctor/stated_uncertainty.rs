@@ -1,4 +1,4 @@
-//! What the accepted hypotheses do to the answer.
+//! The effect of the accepted hypotheses on the answer.
 
 use nalgebra::{Matrix6, Vector6};
 
@@ -15,12 +15,12 @@ use crate::{self as estimate, JointFit, ViewStatus};
 use handeye_geometry::frames::{Camera, Mount, Pose};
 use handeye_geometry::se3;
 
-/// What may be stated for a calibration beside what was judged.
+/// What may be stated for a calibration given what was judged.
 ///
-/// The linear model is fitted with what the calibration counts on already (a bent board, a size, outlier views) and with the accepted hypotheses besides; from the answer to that fit the hand-eye transform moves by what the
-/// calibration misses. A fit of the linear model without the hypotheses is not the answer: where the model is wrong, pose by
-/// pose and all corners together are wrong in different ways. Explanations that are as good as the first are alternatives of
-/// their own.
+/// The linear model is fitted with what the calibration already accounts for (a bent board, a size, outlier views) and also with
+/// the accepted hypotheses; from the answer to that fit the hand-eye transform moves by what the calibration misses. A fit of the
+/// linear model without the hypotheses is not the answer: where the model is wrong, pose by pose and all corners together are wrong
+/// in different ways. Explanations that are as good as the first are alternatives of their own.
 pub(super) fn stated_uncertainty(selection: &Selection<'_>, calibration: &estimate::Fit) -> StatedUncertainty {
     let model = &selection.model;
     let counted = |effect: Effect| counts_on(calibration, effect);
@@ -32,7 +32,7 @@ pub(super) fn stated_uncertainty(selection: &Selection<'_>, calibration: &estima
         match &judged.candidate {
             Candidate::Effect(effect) => {
                 with.effects.push(*effect);
-                // What is too small to be reported moves no claim: nobody could mend it.
+                // An effect too small to be reported changes no claim: nobody could correct it.
                 let is_missed = !counted(*effect) && judged.matters;
                 missed |= is_missed;
                 missed_more_than_size |= is_missed && *effect != Effect::Scale;
@@ -51,7 +51,7 @@ pub(super) fn stated_uncertainty(selection: &Selection<'_>, calibration: &estima
     if !missed && others.is_empty() {
         return StatedUncertainty::AsModelled;
     }
-    // The linear model has the errors of an arm that is known: it moves the answer that goes with them.
+    // The linear model has the errors of an arm that is known: it moves the answer that belongs to them.
     let answer = calibration.arm().map(|arm| arm.hand_eye).or(calibration.hand_eye);
     let Some(answer) = answer else { return StatedUncertainty::Nothing };
     let to = |fit: &Fit| alternative(&answer.mount_from_camera(), &model.solution.mount_from_camera, fit);
@@ -68,7 +68,8 @@ pub(super) fn stated_uncertainty(selection: &Selection<'_>, calibration: &estima
     StatedUncertainty::Moved(alternatives)
 }
 
-/// What may be stated where sessions share a lens and have several: the answer may be off by what its own would move it.
+/// What may be stated where sessions share a lens but differ in it: the answer may be off by as much as its own lens
+/// would move it.
 pub(super) fn with_own_lens(stated: StatedUncertainty, calibration: &estimate::Fit) -> StatedUncertainty {
     let shared = calibration.shared_lens.as_ref().filter(|shared| shared.has_others());
     match shared {
@@ -85,8 +86,8 @@ pub(super) fn with_own_lens(stated: StatedUncertainty, calibration: &estimate::F
 }
 
 /// What may be stated where the robot's field leaves the size of the target open: a size that is off as prints and rulers are would
-/// go unnoticed, so the answer may be off by what the size that the data like best, drawn to the stated one, would move it. Where the
-/// errors of the arm are known they tell a size from an arm, but for one that is off by less than prints are.
+/// go unnoticed, so the answer may be off by as much as the most likely size, drawn to the stated one, would move it. Where the
+/// errors of the arm are known they separate a size from an arm, except for one that is off by less than prints are.
 pub(super) fn with_open_size(stated: StatedUncertainty, calibration: &estimate::Fit) -> StatedUncertainty {
     let size = calibration.joint.as_ref().filter(|_| calibration.arm().is_none()).and_then(JointFit::open_size);
     match size {
@@ -113,13 +114,13 @@ fn counts_on(calibration: &estimate::Fit, effect: Effect) -> bool {
     match effect {
         Effect::Warp => joint.free.warp,
         Effect::Scale => joint.free.scale || calibration.arm().is_some_and(|arm| arm.beside.free.scale),
-        // Its stated error counts the zeros of the arm.
+        // Its stated error includes the zeros of the arm.
         Effect::Joint(_) => calibration.arm().is_some(),
         Effect::Lens | Effect::Centre | Effect::BoardMoved(_) | Effect::CameraMoved(_) => false,
     }
 }
 
-/// Whether the answer counts on what a hypothesis says.
+/// Whether the answer already accounts for a hypothesis.
 pub(super) fn is_applied(calibration: &estimate::Fit, hypothesis: &Hypothesis) -> bool {
     match hypothesis.code {
         FindingCode::BoardBent => counts_on(calibration, Effect::Warp),
@@ -129,7 +130,7 @@ pub(super) fn is_applied(calibration: &estimate::Fit, hypothesis: &Hypothesis) -
     }
 }
 
-/// Whether the answer is without a view.
+/// Whether a view is left out of the answer.
 fn is_out(calibration: &estimate::Fit, name: &str) -> bool {
     calibration.views.iter().any(|view| view.name == name && view.status != ViewStatus::Used)
 }

@@ -1,4 +1,5 @@
-//! What the images alone say: the target's pose in every view, how precisely, and how lens and target shape turn it.
+//! What the images alone determine: the target's pose in every view, its precision, and how lens and target shape
+//! change it.
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3};
 
@@ -26,13 +27,13 @@ use handeye_wording::text;
 /// A corner this many robust standard deviations from where its view puts it is wrong. Real detectors have long tails,
 /// so the limit is wide.
 const WRONG_SIGMAS: f64 = 10.0;
-/// And at least so far, pixels: less does not move a pose of many corners.
+/// And at least this far, pixels: less does not move a pose of many corners.
 const WRONG_PX: f64 = 1.0;
 /// At most this part of a view's corners is called wrong; beyond it the view is.
 const WRONG_PART: f64 = 0.2;
 /// Rounds of leaving the worst corners out and fitting again.
 const ROUNDS: usize = 6;
-/// Steps to the pose of a view from where it is without what its corners share.
+/// Steps to the pose of a view from the one without the noise that its corners share.
 const MOST_STEPS: usize = 20;
 /// A view whose corners are noisier than this many times the typical one is weighted by its own noise.
 const NOISY: f64 = 2.0;
@@ -55,15 +56,15 @@ pub struct SessionView {
     pub(crate) alternative: Option<Isometry3<f64>>,
     /// Covariance of the target's pose by corner noise, right perturbation; zero where the pose was given.
     pub covariance: Matrix6<f64>,
-    /// How the measured pose turns with lens (then warp x, y): the measured pose is off by minus this.
+    /// Jacobian of the measured pose by lens (then warp x, y): the measured pose is off by minus this.
     pub(crate) by_form: DMatrix<f64>,
     pub(crate) tip_from_joints: Vec<Isometry3<f64>>,
-    /// Corners that do not belong where they are, by their index in the target.
+    /// Wrong corners, by their index in the target.
     pub(crate) wrong_corners: Vec<usize>,
     pub(crate) corners: usize,
 }
 
-/// All views as the camera saw them.
+/// All views as seen by the camera.
 pub struct SessionViews {
     pub(crate) mode: Mode,
     /// One per view that counts.
@@ -77,10 +78,11 @@ pub struct SessionViews {
     pub(crate) lens_free: bool,
     /// Noise of a corner per axis, pixels.
     pub(crate) corner_px: Option<f64>,
-    /// What the corners, apart from the poses, say of lens and warp: information and gradient in units of the noise.
+    /// What the corners, apart from the poses, determine of lens and warp: information and gradient in units of the
+    /// noise.
     pub(crate) form_information: DMatrix<f64>,
     pub(crate) form_gradient: DVector<f64>,
-    /// Degrees of freedom of how the views scatter, which the variances of a lens given and of a bend rest on.
+    /// Degrees of freedom of the scatter of the views, on which the variances of a given lens and of a bend rest.
     pub(crate) form_freedom: f64,
     /// The target as the camera sees it.
     pub target: SeenTarget,
@@ -95,14 +97,14 @@ struct Fit {
     corners: Corners,
     wrong: Vec<usize>,
     pose: PlanarPose,
-    /// How the corners count: each alike, unless their detector states what they have in common.
+    /// Weights of the corners: equal, unless their detector states a common covariance.
     whitener: Whitener,
     /// Variance of a corner per axis by the residuals of the view.
     variance_px2: f64,
 }
 
 impl SessionViews {
-    /// Joints that are known in every view.
+    /// Number of joints that are known in every view.
     pub(crate) fn joints(&self) -> usize {
         self.views.iter().map(|v| v.tip_from_joints.len()).min().unwrap_or(0)
     }
@@ -242,8 +244,8 @@ impl SessionViews {
         Ok(())
     }
 
-    /// What all views say of the form. Corners of one view err alike (blur, a print that is not true), so what they say of a lens
-    /// that was given counts as much less as the views scatter more than independent corners would make them.
+    /// Sums the information of all views on the form. Corners of one view have common errors (blur, an inaccurate print), so
+    /// their information on a given lens is reduced by as much as the views scatter more than with independent corners.
     fn take_form(&mut self, scores: &[Score], count: usize) {
         self.form_information = scores.iter().fold(DMatrix::zeros(count, count), |sum, score| sum + &score.information);
         self.form_gradient = scores.iter().fold(DVector::zeros(count), |sum, score| sum + &score.gradient);
@@ -264,8 +266,8 @@ impl SessionViews {
     }
 }
 
-/// How the views scatter in what they say of focal lengths and centre, the rest of the lens as given; `None` where they say
-/// nothing of them.
+/// Scatter of the views' estimates of focal lengths and centre, the rest of the lens as given; `None` where they do not
+/// determine them.
 fn pinhole_scatter(scores: &[Score]) -> Option<Scatter> {
     const PINHOLE: usize = 4;
     let of_pinhole = |score: &Score| Score {
@@ -287,8 +289,8 @@ impl Fit {
     }
 }
 
-/// Poses again where a detector states what the corners of a view have in common, as those of hard edges do: of a board along the
-/// pixels the residuals do not show how far all of it may be off.
+/// Fits poses again where a detector states a common covariance of the corners of a view, as those of hard edges do: with a board
+/// along the pixels the residuals do not show how far all of it may be off.
 fn with_what_corners_share(fits: &mut [Option<Fit>], camera: &Intrinsics, points: &BoardPoints) {
     let stated = fits.iter().flatten().filter(|fit| fit.corners.covariance().is_some());
     let Some(weights) = CornerWeights::stated(stated.flat_map(|fit| fit.corners.iter())) else { return };

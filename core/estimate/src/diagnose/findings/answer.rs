@@ -12,10 +12,10 @@ use handeye_wording::{Text, shown};
 
 /// Views below which none can stand out from the others.
 const MIN_FOR_OUTLIERS: usize = 5;
-/// How many robust standard deviations ([`SIGMA_PER_MEDIAN_SIZE`] times the median absolute deviation) a view may lie above the median. Five
-/// are reached by chance in one of 3 million views of Gaussian noise; real noise has longer tails.
+/// Number of robust standard deviations ([`SIGMA_PER_MEDIAN_SIZE`] times the median absolute deviation) a view may lie above the
+/// median. Five are reached by chance in one of 3 million views of Gaussian noise; real noise has longer tails.
 const ROBUST_SIGMAS: f64 = 5.0;
-/// And at least so many times the median, because the deviation of a handful of views is itself uncertain.
+/// And at least this many times the median, because the deviation of a handful of views is itself uncertain.
 const TIMES_MEDIAN: f64 = 3.0;
 /// Length of the six numbers of a correction over the noise levels: passed by chance by one view in 400 000.
 const CORRECTION_SIGMAS: f64 = 6.0;
@@ -26,14 +26,15 @@ const PREDICTION: f64 = 1.5;
 /// Robot noise over corner noise, both in pixels, from which better images hardly help: a tenth part in the square.
 const ROBOT_OVER_CORNERS: f64 = 3.0;
 /// Difference of fx and fy, part of either, that no camera has: pixels are drawn as true squares to a hundredth of a percent, a
-/// lens without cylinders is round, and a sensor would have to lean by 8° against the axis to look 1 % shorter. What is
-/// looked for is larger: 640×480 made of 1280×1024 is 7 % off, of 1920×1080 33 %, a print that was fitted to its page some percent.
+/// lens without cylinders is round, and a sensor would have to lean by 8° against the axis to look 1 % shorter. The errors to be
+/// detected are larger: 640×480 made of 1280×1024 is 7 % off, of 1920×1080 33 %, a print that was fitted to its page some percent.
 const LEAST_ASPECT: f64 = 0.01;
-/// Standard deviations that the difference has to be beyond that: one camera in seven hundred by chance, if it were just as much off.
+/// Number of standard deviations by which the difference has to exceed that: one camera in seven hundred by chance, if it were just
+/// as much off.
 const ASPECT_SIGMAS: f64 = 3.0;
-/// Distance from the middle of the closed forms, metres, from which one of them is worth a word.
+/// Distance from the middle of the closed forms, metres, from which one of them is worth reporting.
 const DISAGREE_M: f64 = 5e-3;
-/// More of the same views than this many times those gathered are no advice.
+/// More of the same views than this many times those gathered are not advised.
 const MOST_TIMES: usize = 4;
 
 pub fn findings(calibration: &Calibration, options: &FindingOptions<'_>) -> Vec<Finding> {
@@ -83,7 +84,7 @@ fn influence(calibration: &Calibration, used: &[&ViewResult]) -> Option<Finding>
         influence = shown(largest_m * 1e3, 2),
         median = shown(median_m * 1e3, 2)
     );
-    // Where a view stands alone is geometry; one that is wrong is told by what it contradicts.
+    // A view in an isolated place is influential by geometry; a wrong one is recognised by what it contradicts.
     let finding = Finding::new(FindingCode::InfluentialView, Severity::Advice, text).of_view(&view.name);
     let finding = finding.with("influence", largest_m * 1e3, "mm").with("median_influence", median_m * 1e3, "mm");
     Some(finding.with("expected_error_95", error_m * 1e3, "mm"))
@@ -111,8 +112,8 @@ fn corrections(calibration: &Calibration, used: &[&ViewResult]) -> Option<Findin
     // One view is named: that which is out by more of its median.
     let (view, ..) =
         [by_distance, by_angle].into_iter().flatten().max_by(|a, b| (a.1 / a.2).total_cmp(&(b.1 / b.2)))?;
-    // Views tell their corrections unequally well, so the median alone is no measure: the noise level must be left too.
-    // One view that makes up all of the noise has at most the root of six times the views.
+    // Views determine their corrections unequally well, so the median alone is not a measure: the noise level must be
+    // left too. One view that makes up all of the noise has at most the root of six times the views.
     let noise = resolution::judged_by(&calibration.joint.as_ref()?.noise);
     let over_noise = (view.correction_m? / noise.robot_m).hypot(view.correction_rad? / noise.robot_rad);
     if over_noise < CORRECTION_SIGMAS.min(0.75 * (6.0 * used.len() as f64).sqrt()) {
@@ -448,7 +449,7 @@ fn towards_goal(calibration: &Calibration, goal_mm: f64) -> Option<(Text, Advise
         );
         return Some((advice, None));
     };
-    // The curve's error equals the stated one but for rounding, so one more is the least that can help.
+    // The curve's error equals the stated one except for rounding, so at least one more is needed.
     let more = needed.saturating_sub(views).max(1);
     let advice = text!("About {more} more {more|view|views} like those gathered will reach it.", more = more);
     Some((advice, Some(("more_views", more as f64, ""))))

@@ -1,4 +1,4 @@
-//! What is said of a depth camera.
+//! Findings on a depth camera.
 
 use super::{Finding, FindingCode, Severity};
 use crate::resolution;
@@ -29,7 +29,7 @@ pub fn finding(report: &DepthReport, stated_error_m: Option<f64>) -> Option<Find
     Some(off(errors))
 }
 
-/// What a tilt of the depths is judged by: how far it moves a point so far aside, metres.
+/// A tilt of the depths is judged by how far it moves a point at this lateral distance, metres.
 const BOARD_M: f64 = 0.1;
 
 fn gross(ratio: f64) -> Finding {

@@ -1,9 +1,9 @@
 //! The direction of the answer that the views leave weakest, by eigen-analysis of its information.
 //!
 //! The covariance of the hand-eye transform is taken to the place where the board was seen and brought to one unit: a
-//! turn counts as what it does to a point at the board's distance. Its largest eigenvalue belongs to the weakest
-//! direction, its smallest to the best. What is seen of a direction follows from `(R − 1) t = …`: turns about axes across
-//! a direction tell the camera's place along it, and turns about axes across an axis tell the camera's turn about it.
+//! turn counts by its effect on a point at the board's distance. Its largest eigenvalue belongs to the weakest direction,
+//! its smallest to the best. What views determine follows from `(R − 1) t = …`: turns about axes across a direction
+//! determine the camera's place along it, and turns about axes across an axis determine the camera's turn about it.
 
 use nalgebra::{Matrix3, Matrix6, SymmetricEigen, Vector3};
 
@@ -13,10 +13,10 @@ use handeye_geometry::se3::skew;
 use handeye_wording::text;
 use handeye_wording::{Text, shown};
 
-/// Weakest over best from which a word is worth it: views on a wide cone leave a factor of three or four.
+/// Ratio of weakest to best from which it is worth reporting: views on a wide cone leave a factor of three or four.
 const UNEVEN: f64 = 5.0;
-/// Largest standard deviation of the weakest direction, metres at the board, that is good to know but no advice: below
-/// it a calibration is good enough for most work.
+/// Largest standard deviation of the weakest direction, metres at the board, that is for information and not advice:
+/// below it a calibration is good enough for most work.
 const MATTERS_M: f64 = 5e-4;
 
 pub fn finding(calibration: &Calibration) -> Option<Finding> {

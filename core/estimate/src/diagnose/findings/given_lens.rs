@@ -10,11 +10,11 @@ pub fn findings(calibration: &Calibration) -> impl Iterator<Item = Finding> {
     taken_as_exact(calibration).into_iter().chain(beyond_accuracy(calibration))
 }
 
-/// How many times what is stated the error of a lens that is good to half a pixel is for what is stated to hang on it: by its square it
-/// is then as much again.
+/// Ratio of the error with a lens that is good to half a pixel to the stated one, from which the latter depends on the lens: its
+/// square is then doubled.
 const MUCH: f64 = std::f64::consts::SQRT_2;
 
-/// What is stated hangs on the lens.
+/// The stated error depends on the lens.
 fn taken_as_exact(calibration: &Calibration) -> Option<Finding> {
     let joint = calibration.joint.as_ref()?;
     let (at_half_m, stated_m) = (joint.error_at_half_a_pixel_95_m?, calibration.error_95_m(&joint.reference_point)?);
@@ -30,7 +30,7 @@ fn taken_as_exact(calibration: &Calibration) -> Option<Finding> {
     Some(finding.with("expected_error_at_half_a_pixel", at_half_m * 1e3, "mm"))
 }
 
-/// The lens that fits is farther from the one given than is said of it.
+/// The lens that fits is farther from the one given than its stated accuracy.
 fn beyond_accuracy(calibration: &Calibration) -> Option<Finding> {
     let RefutedLens { accuracy_px, off_px } = calibration.joint.as_ref()?.refuted_lens?;
     let text = text!(

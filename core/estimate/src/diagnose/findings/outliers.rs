@@ -1,5 +1,5 @@
-//! Findings on what the estimate decided by itself: views and corners left out as an outlier, views numbered from the other end, a
-//! bent target, a widened uncertainty, noise levels that cannot be told apart.
+//! Findings on what the estimate decided on its own: views and corners left out as an outlier, views numbered from the other end,
+//! a bent target, a widened uncertainty, noise levels that cannot be told apart.
 
 use super::{Finding, FindingCode, Severity, listed};
 use crate::diagnose::Calibration;
@@ -10,10 +10,11 @@ use handeye_wording::{Text, shown};
 /// Relative standard deviation of a noise level above which it counts as not determined: where it is with a probability of
 /// 95 % the highest is then seven times the lowest, e^(4 · 0.5).
 const UNCLEAR: f64 = 0.5;
-/// A level that makes no more than this of what the corners' own noise does to a pose needs no telling apart: it is a fifth of
-/// the variance of both together.
+/// A level whose effect on a pose is no more than this part of that of corner noise need not be told apart from it: it is a
+/// fifth of the variance of both together.
 const NO_MATTER: f64 = 0.5;
-/// A stated uncertainty that was widened by fewer times is not worth a word: standard deviations are read to one figure.
+/// A stated uncertainty that was widened by fewer times is not worth reporting: standard deviations are read to one
+/// figure.
 pub const WIDENING_WORTH_SAYING: f64 = 1.05;
 
 pub fn findings(calibration: &Calibration) -> Vec<Finding> {
@@ -176,7 +177,7 @@ fn unclear(calibration: &Calibration) -> Option<Finding> {
         return None;
     }
     let level = |low: f64, high: f64, least: f64, reported: &dyn Fn(f64) -> String| {
-        // Below what a robot resolves there is nothing to tell from nothing.
+        // Below what a robot resolves it cannot be distinguished from zero.
         if low < least {
             text!("below {high}", high = reported(high))
         } else {

@@ -6,7 +6,7 @@ use crate::shared_lens::OddSession;
 use handeye_wording::text;
 use handeye_wording::{Text, shown};
 
-/// Sessions whose lens differs from that of the others: a warning where it is another one.
+/// Sessions whose lens differs from that of the others: a warning where it is a different lens.
 pub fn finding(calibration: &Calibration) -> Option<Finding> {
     let shared = calibration.shared_lens.as_ref()?;
     let farthest = shared.odd.iter().max_by(|a, b| apart_px(a).total_cmp(&apart_px(b)))?;

@@ -19,7 +19,7 @@ fn of_trial(t: &Session, free: bool, options: &FindingOptions) -> Vec<Finding> {
     findings(&observations, Some(&solve(&observations)), options)
 }
 
-/// As a user sees it who keeps views that do not fit.
+/// The findings for a user who keeps views that do not fit.
 fn of_all_views(t: &Session) -> Vec<Finding> {
     let observations = t.observations(false);
     let keep = Options { keep_outliers: true, ..Options::default() };

@@ -12,7 +12,8 @@ use handeye_geometry::frames::{Anchor, Mount, Pose};
 use handeye_wording::Text;
 use handeye_wording::text;
 
-/// Largest turn between two views, degrees, below which views count as alike: the published sessions turn by 60° and more.
+/// Largest turn between two views, degrees, below which views count as too similar: the published sessions turn by 60° and
+/// more.
 const ALIKE_DEG: f64 = 20.0;
 /// RMS turn about the second axis, degrees, below which it is weak. In simulation (ten views, robot noise 0.1 mm and
 /// 0.02°) tilts within 10° (RMS turn 7°) leave three times the error of tilts within 35° (25°), and within 20° twice.
@@ -22,7 +23,7 @@ const BETTER_DEG: f64 = 17.0;
 /// Largest tilt of the board against the optical axis, degrees, below which focal length and distance are hard to tell
 /// apart: perspective grows with the sine of the tilt.
 const TILT_DEG: f64 = 20.0;
-/// Standard deviation of the focal length, part of it, that costs: at half a metre 0.3 % is 1.5 mm.
+/// Standard deviation of the focal length, relative, from which it matters: at half a metre 0.3 % is 1.5 mm.
 const FOCAL_SIGMA: f64 = 0.003;
 /// Cells of the image on which coverage is judged.
 const CELLS: (usize, usize) = (8, 6);
@@ -94,7 +95,7 @@ fn not_found(in_fit: &[&ObservedView], only_poses: bool) -> Option<Finding> {
 
 /// Turns of the tip, in tip axes for both set-ups: that is what a person can turn.
 fn turns(seen: &[&ObservedView]) -> Option<Finding> {
-    // Base and tip take the parts of anchor and mount, whichever of them carries the camera.
+    // Base and tip take the parts of anchor and mount, whichever of the two carries the camera.
     let poses: Vec<Pose<Anchor, Mount>> = seen.iter().filter_map(|v| v.base_from_tip).map(|p| p.relabel()).collect();
     match motion::analyse(&poses) {
         Err(HandEyeError::NoRotation { largest_deg }) => Some(alike(largest_deg, Severity::Problem)),
@@ -109,7 +110,7 @@ fn turns(seen: &[&ObservedView]) -> Option<Finding> {
             let finding = Finding::new(FindingCode::OneRotationAxis, Severity::Problem, text);
             Some(with_axis(finding, &axis).with("spread", spread_deg, "°"))
         }
-        // Too few views and poses that are not finite are told elsewhere.
+        // Too few views and poses that are not finite are reported elsewhere.
         Err(_) => None,
         Ok(summary) => {
             let largest_deg = summary.largest_rotation_rad.to_degrees();

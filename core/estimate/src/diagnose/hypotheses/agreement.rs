@@ -6,8 +6,8 @@ use crate::handeye::closed_form::{ClosedForm, ClosedFormSolution, ParkMartin, Sh
 use crate::handeye::{HandEyeError, PosePair, subset};
 use handeye_geometry::statistics::median;
 
-/// Choices of views that are tried besides all of them. With three of ten views wrong a choice of five is clean once in
-/// six times, and the two steps below mend choices with one wrong view.
+/// Choices of views that are tried in addition to all of them. With three of ten views wrong a choice of five is clean
+/// once in six times, and the two steps below correct choices with one wrong view.
 const CHOICES: usize = 10;
 /// Views below which there is nothing to choose from.
 const MIN_TO_CHOOSE: usize = 8;

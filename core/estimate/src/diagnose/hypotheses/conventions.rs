@@ -1,4 +1,5 @@
-//! Conventions by which poses are written: units, directions, forms of rotations. What numbers mean under each of them.
+//! Conventions by which poses are written: units, directions, forms of rotations. And what numbers mean under each of
+//! them.
 
 use std::fmt;
 
@@ -42,7 +43,7 @@ impl LengthUnit {
         }
     }
 
-    /// As `--set` has it.
+    /// Its name in `--set`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Metre => "m",
@@ -73,7 +74,7 @@ impl AngleUnit {
         }
     }
 
-    /// As `--set` has it.
+    /// Its name in `--set`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Radian => "rad",
@@ -104,7 +105,8 @@ impl Direction {
         }
     }
 
-    /// Which way `anchor_from_mount` is what is written of the robot: the mount moves the other way where the camera stands beside it.
+    /// In which direction the written pose of the robot is `anchor_from_mount`: it is inverted where the camera is next to the
+    /// robot (eye to hand).
     #[must_use]
     pub fn of_mount(self, mode: Mode) -> Self {
         if mode == Mode::EyeInHand { self } else { self.other() }
@@ -180,7 +182,7 @@ impl Euler {
 }
 
 impl RotationForm {
-    /// As `--set rotation=` has it; of turns the axes and the columns, from left to right of the product.
+    /// Its name in `--set rotation=`; for turns the axes and the columns, from left to right of the product.
     pub fn name(self) -> String {
         match self {
             Self::Vector => "rotation_vector".into(),
@@ -195,8 +197,8 @@ impl RotationForm {
         }
     }
 
-    /// The form of a name. Besides [`name`](Self::name): `rpy`, `kuka_abc`, `fanuc_wpr`, and `euler_xyz` or `euler_XYZ` as
-    /// SciPy has them, about fixed or about moving axes.
+    /// The form with a name. In addition to [`name`](Self::name): `rpy`, `kuka_abc`, `fanuc_wpr`, and `euler_xyz` or
+    /// `euler_XYZ` as in SciPy, about fixed or about moving axes.
     pub fn by_name(name: &str) -> Option<Self> {
         match name {
             "rotation_vector" => return Some(Self::Vector),
@@ -234,7 +236,7 @@ impl RotationForm {
         Some(Self::Euler(euler))
     }
 
-    /// Those that numbers of this kind may have when nothing is said of them.
+    /// Those that numbers of this kind may have when nothing is stated about them.
     pub fn all_for(numbers: &Numbers) -> Vec<Self> {
         match numbers {
             Numbers::Angles(_) => {
@@ -276,14 +278,14 @@ impl fmt::Display for RotationForm {
 pub struct Reading {
     /// The unit of positions.
     pub length: LengthUnit,
-    /// Of angles; says nothing where there are none.
+    /// The unit of angles; unused where there are none.
     pub angle: AngleUnit,
     /// How rotations are written down.
     pub rotation: RotationForm,
 }
 
 impl Reading {
-    /// The transform that was written, metres; `None` where the numbers cannot be meant so.
+    /// The transform that was written, metres; `None` where the numbers do not fit this reading.
     pub fn transform(&self, numbers: &Numbers) -> Option<Isometry3<f64>> {
         let metres = self.length.metres();
         let (translation, rotation) = match (numbers, self.rotation) {
@@ -310,8 +312,8 @@ impl Reading {
         finite.then(|| Isometry3::from_parts(Translation3::from(translation * metres), rotation))
     }
 
-    /// The numbers that a transform is written as, those that [`transform`](Self::transform) reads; `None` for matrices and products of
-    /// turns other than roll, pitch and yaw.
+    /// The numbers that a transform is written as, those that [`transform`](Self::transform) reads; `None` for matrices and
+    /// products of turns other than roll, pitch and yaw.
     pub(crate) fn numbers(&self, pose: &Isometry3<f64>) -> Option<Numbers> {
         let [x, y, z] = (pose.translation.vector / self.length.metres()).into();
         let q = pose.rotation.coords;

@@ -1,36 +1,37 @@
 //! Hypotheses about conventions and pairing: what recorded poses may mean, each tried against what the camera saw.
 //!
 //! # What a hypothesis is
-//! A mapping of every view to `base_from_tip`, by which the mount moves, and to `camera_from_target` ([`Hypothesis`]). It says
-//! which way poses map, in which units and which order of numbers they were written ([`conventions`]), which pose belongs to
-//! which image ([`pairing`]; [`steps`] where that changes within a session), and where the camera sits.
+//! A mapping of every view to `base_from_tip`, by which the mount moves, and to `camera_from_target` ([`Hypothesis`]). It
+//! states which way poses map, in which units and which order of numbers they were written ([`conventions`]), which pose
+//! belongs to which image ([`pairing`]; [`steps`] where that changes within a session), and where the camera is.
 //!
 //! # How it is scored
 //! Under each of them the closed forms are solved, and the distance between where the chain puts the target's outer points and
 //! where the camera saw them is measured at the median view ([`agreement()`]). That is on the camera's side, in metres, so it
-//! means the same under every unit of the robot's poses. Hypotheses are compared by their *misfit*: it over the target's distance.
+//! means the same under every unit of the robot's poses. Hypotheses are compared by their *misfit*: this distance over that of the
+//! target.
 //!
 //! | threshold | |
 //! | --- | --- |
-//! | [`CLEAR`] | below it poses have no gross fault, and the other hypotheses need no second look |
+//! | [`CLEAR`] | below it poses have no gross fault, and the other hypotheses are not examined further |
 //! | [`EXPLAINED`], [`EXPLAINED_RAD`] | below it a hypothesis explains the views |
-//! | [`TIMES`] | so many times more rules another one out |
+//! | [`TIMES`] | this many times more rules another one out |
 //! | [`NEED`] | views with which hypotheses can be told apart |
 //!
 //! # In which order
-//! From view to view robot and target turn by the same angle, whatever the units of length and wherever the camera sits: what
-//! contradicts that can be dropped before anything is solved ([`turns`]). The others are solved plainly, and where none of them
-//! is clear again on choices of views, since a few wrong ones spoil a plain solution ([`ranked`]). Those with about the
-//! same misfit are sorted by how common they are ([`sort_by_misfit`]).
+//! From view to view robot and target turn by the same angle, whatever the units of length and the place of the camera: what
+//! contradicts that can be dropped before anything is solved ([`turns`]). The others are solved plainly and, where none of them
+//! is clear, again on choices of views, since a few wrong ones spoil a plain solution ([`ranked`]). Those with about the same
+//! misfit are sorted by how common they are ([`sort_by_misfit`]).
 //!
 //! # What follows
 //! One hypothesis that explains the views while every other is ruled out is [decided](Verdict::Decided); several that explain
 //! them alike are [ambiguous](Verdict::Ambiguous), and nothing is [guessed](Verdict::Unexplained). Poses that map the other way
-//! with the camera in the other place give the same equations, so no data tell those two apart.
+//! with the camera in the other place give the same equations, so no data can separate those two.
 //!
 //! # Who asks
 //! The [doctor](super::doctor) tries changes of poses whose conventions were stated, which stay unless they are ruled out. The
-//! importer of foreign recordings (`handeye_import`) tries what the files leave unsaid.
+//! importer of foreign recordings (`handeye_import`) tries what the files do not state.
 
 pub mod agreement;
 pub mod conventions;
@@ -47,14 +48,14 @@ use crate::handeye::{HandEyeError, PosePair, subset};
 use agreement::{Agreement, agreement};
 use handeye_geometry::progress::Work;
 
-/// A smaller misfit is no gross fault: arms that are off by 3 mm half a metre away stay below.
+/// A smaller misfit is not a gross fault: arms that are off by 3 mm half a metre away stay below.
 pub(crate) const CLEAR: f64 = 0.01;
 /// A hypothesis that explains the views has a smaller misfit, which is ten times that of such arms.
 pub const EXPLAINED: f64 = 0.05;
 /// And at the median a smaller angle \[rad\] than this: the same part of a turn by one radian.
 pub const EXPLAINED_RAD: f64 = 0.05;
-/// Another one is ruled out when its misfit is so many times larger. By these three no gross fault was accused in 3,000 healthy simulated
-/// sessions, and those that were injected are found (`docs/studies/diagnosis.md`).
+/// Another one is ruled out when its misfit is this many times larger. By these three no gross fault was accused in 3,000 healthy
+/// simulated sessions, and those that were injected are found (`docs/studies/diagnosis.md`).
 pub const TIMES: f64 = 3.0;
 /// Views with which hypotheses can be told apart: with three any of them fits half of them.
 pub const NEED: usize = 4;
@@ -69,10 +70,10 @@ pub trait Hypothesis {
     fn target(&self) -> &SeenTarget;
     /// Number of views.
     fn views(&self) -> usize;
-    /// What it makes of a view; `None` where that has no pose.
+    /// The pose pair that a view gives under it; `None` where that has no pose.
     fn pair(&self, view: usize) -> Option<PosePair>;
 
-    /// Solves it with so many of its views, spread over the session. `robust` also tries choices of them.
+    /// Solves it with this many of its views, spread over the session. `robust` also tries choices of them.
     ///
     /// # Errors
     /// That of the closed forms.
@@ -94,7 +95,7 @@ pub trait Hypothesis {
 pub struct SeenTarget {
     /// Four outer points of it, where misfits are measured, metres.
     pub outer: [Point3<f64>; 4],
-    /// By which it looks the same.
+    /// Turns after which it looks the same.
     pub turns: Turns,
     /// Median distance of it from the camera, metres.
     pub distance_m: f64,
@@ -102,7 +103,7 @@ pub struct SeenTarget {
 
 impl SeenTarget {
     /// How far a solution puts it from where it was seen, metres and radians; where it looks the same after a turn, in the
-    /// nearest way to count it.
+    /// nearest numbering.
     pub fn misfit(&self, solution: &ClosedFormSolution, pair: &PosePair) -> (f64, f64) {
         let chain = agreement::chain(solution, pair);
         let seen = *pair.camera_from_target.isometry();
@@ -110,21 +111,22 @@ impl SeenTarget {
             (agreement::misfit(&self.outer, &chain, seen), chain.rotation.angle_to(&seen.rotation))
         };
         let ways = std::iter::once(seen).chain(self.turns.others(&seen)).map(|seen| of(&seen));
-        // The first of equals, which is as it was detected.
+        // Of equal ones the first, which is the numbering as detected.
         ways.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, f64::INFINITY))
     }
 }
 
-/// How hypotheses are searched.
+/// Settings of the search among hypotheses.
 pub struct Search<'a> {
-    /// Views that are looked at.
+    /// Most views that are used.
     pub most_views: usize,
     /// Hypotheses that are solved on choices of views, which takes some ten times as long.
     pub most_robust: usize,
-    /// Where there are more: by how much robot and target turn differently, which a few wrong views do not spoil. The most alike
-    /// come first.
+    /// How unequally robot and target turn, which a few wrong views do not spoil: where there are more hypotheses, those with
+    /// the most equal turns come first.
     pub unlike_rad: &'a dyn Fn(usize) -> f64,
-    /// Misfit of the poses as they were stated, solved robustly, where it is known. It says beforehand which of the two passes counts.
+    /// Misfit of the poses as they were stated, solved robustly, where it is known. It determines beforehand which of the two
+    /// passes counts.
     pub as_stated: Option<f64>,
 }
 
@@ -132,14 +134,15 @@ pub struct Search<'a> {
 pub struct Ranked {
     /// Its place among those that were tried.
     pub index: usize,
-    /// Median distance between where it puts the target and where it was seen over the target's distance; infinite without a solution.
+    /// Median distance between where it puts the target and where it was seen over the target's distance; infinite without a
+    /// solution.
     pub misfit: f64,
     /// Its solution.
     pub agreement: Option<Agreement>,
 }
 
-/// Solves so many hypotheses, plainly and, where nothing is clear, robustly, and sorts them by their misfit. Not all of them when
-/// `work` is cancelled.
+/// Solves this many hypotheses, plainly and, where nothing is clear, robustly, and sorts them by their misfit. Not all of them
+/// when `work` is cancelled.
 pub fn ranked<H: Hypothesis>(
     count: usize,
     hypothesis: impl Fn(usize) -> Option<H>,
@@ -203,7 +206,7 @@ pub struct Score {
 pub enum Verdict {
     /// The first is the only one that explains the views.
     Decided,
-    /// The first so many explain them about as well: a person has to say which it is.
+    /// The first this many explain them about equally well: a person has to decide which it is.
     Ambiguous(usize),
     /// None explains them.
     Unexplained,

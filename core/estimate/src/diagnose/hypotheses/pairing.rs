@@ -35,15 +35,15 @@ impl Order {
     }
 }
 
-/// Which of those in order belongs to a row, counted so many further.
+/// Which one in the order belongs to a row, counted this many further.
 pub fn along(order: &[usize], row: usize, further: isize) -> Option<usize> {
     order.get(row.checked_add_signed(further)?).copied()
 }
 
-/// The image of every pose, in order, that a cost of every image at every pose speaks for: poses and images may be left out on
-/// either side. `None` where nothing is cheaper than leaving out.
+/// The image of every pose, in order, that has the least cost, given that of every image at every pose: poses and images may
+/// be left out on either side. `None` where nothing is cheaper than leaving out.
 pub fn aligned(poses: usize, images: usize, leave_out: f64, cost: impl Fn(usize, usize) -> f64) -> Vec<Option<usize>> {
-    // The least cost of the first so many of both.
+    // The least cost of the first ones of both, up to each count.
     let mut best = vec![vec![0.0f64; images + 1]; poses + 1];
     for p in 0..=poses {
         for i in 0..=images {

@@ -1,7 +1,7 @@
 //! Whether the robot's lengths fit a target of another size than was stated.
 //!
 //! Images show a target up to its size, and a calibration with a wrong one leaves a misfit that looks like a poor recording: the
-//! robot's lengths say which size it is. That is searched along the logarithm of the factor by golden section.
+//! robot's lengths determine the size. That is searched along the logarithm of the factor by golden section.
 
 use super::SeenTarget;
 use super::agreement::agreement;
@@ -10,12 +10,12 @@ use crate::handeye::numbering::alike;
 use crate::handeye::subset;
 use handeye_geometry::frames::Pose;
 
-/// Factors that are looked at.
+/// Largest factor that is tried.
 const WIDEST: f64 = 5.0;
-/// Factors among which the search begins, and steps that follow.
+/// Number of factors with which the search begins, and steps that follow.
 const COARSE: usize = 15;
 const STEPS: usize = 18;
-/// Views that are looked at.
+/// Most views that are used.
 const MOST_VIEWS: usize = 30;
 const GOLDEN: f64 = 0.618_033_988_749_894_8;
 
@@ -24,13 +24,13 @@ const GOLDEN: f64 = 0.618_033_988_749_894_8;
 pub struct Scale {
     /// How many times the stated one.
     pub factor: f64,
-    /// What it leaves at the median, by the stated size, metres.
+    /// Median misfit that it leaves, in terms of the stated size, metres.
     pub misfit_m: f64,
-    /// What the stated size leaves, metres.
+    /// Median misfit that the stated size leaves, metres.
     pub stated_m: f64,
 }
 
-/// The size of the target that leaves least; `None` where the stated size has no solution.
+/// The size of the target with the least misfit; `None` where the stated size has no solution.
 pub fn best(target: &SeenTarget, pairs: &[PosePair]) -> Option<Scale> {
     let chosen: Vec<PosePair> = subset::spread(pairs.len(), MOST_VIEWS).into_iter().map(|i| pairs[i]).collect();
     let chosen = alike(&chosen, &target.turns);

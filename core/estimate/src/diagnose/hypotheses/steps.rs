@@ -1,6 +1,6 @@
 //! A step in the pairing: an image or a pose is missing from some view on, or is there twice.
 //!
-//! The median view says nothing of it, since one side of the session is in step. A solution of that side predicts, for every
+//! The median view does not show it, since one side of the session is in step. A solution of that side predicts, for every
 //! place of the step, the other side a row or two further.
 
 use super::Hypothesis;
@@ -10,15 +10,15 @@ use crate::handeye::closed_form::ClosedFormSolution;
 
 /// Rows by which images and poses may be out of step: one image or pose that is missing or there twice, or two of them.
 pub(crate) const SHIFTS: [isize; 4] = [-1, 1, -2, 2];
-/// Views on either side of a step at the least: fewer are outliers.
+/// Least number of views on either side of a step: fewer are outliers.
 pub const LEAST_BESIDE: usize = 3;
-/// Views that a solution of one side of a step rests on at the least.
+/// Least number of views for a solution of one side of a step.
 const LEAST_SOLVED: usize = 4;
 /// A misfit beyond this part of the target's distance counts as this much: views that are wrong for other reasons must not
 /// decide where a step is.
 const CAP: f64 = 0.1;
 
-/// Views belong to the row so many further, differently before a view and from it on.
+/// Views belong to the row this many further, differently before a view and from it on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Step {
     /// The first view after it.
@@ -45,7 +45,7 @@ pub fn wrong(h: &impl Hypothesis, solution: Option<&ClosedFormSolution>, wrong_m
 /// Whether a step explains at least two in three of the views that are wrong without it, and its own solution puts at least
 /// two, and two in three, of the views that it pairs with another row right with that row and wrong with their own. Without
 /// the second a solution that gives up the views after the step, and therefore suits the others better, would count as an
-/// explanation. Views beside the step do not count: where poses are missing, as many images there belong to none.
+/// explanation. Views next to the step do not count: where poses are missing, as many images there belong to none.
 pub fn explains<H: Hypothesis>(
     step: Step,
     (as_stated, solution): (&H, Option<&ClosedFormSolution>),
@@ -63,14 +63,14 @@ pub fn explains<H: Hypothesis>(
     let own_row_wrong = judged(wrong(as_stated, Some(stepped_solution), wrong_m));
     let moved = |view: &usize| step.further(*view) != 0;
     let repaired = own_row_wrong.iter().filter(|view| moved(view) && !still_wrong.contains(view)).count();
-    // An image of which the table has no pose cannot be repaired.
+    // An image for which the table has no pose cannot be repaired.
     let has_row = |view: &usize| stepped.pair(*view).is_some();
     let paired_anew = judged((0..stepped.views()).collect()).iter().filter(|v| moved(v) && has_row(v)).count();
     without >= 2 && 3 * still_wrong.len() <= without && repaired >= 2 && 3 * repaired >= 2 * paired_anew
 }
 
-/// The step that lets most views agree with the solution of one side of the session, by the hypotheses that all views belong so
-/// many rows further; `None` when the views are too few.
+/// The step that lets most views agree with the solution of one side of the session, by the hypotheses that all views belong
+/// this many rows further; `None` when the views are too few.
 pub(crate) fn best_step<H: Hypothesis>(shifted: impl Fn(isize) -> H) -> Option<Step> {
     let as_stated = shifted(0);
     let others = SHIFTS.map(|by| (by, shifted(by)));

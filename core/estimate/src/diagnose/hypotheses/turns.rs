@@ -1,9 +1,9 @@
 //! Which conventions the turns alone rule out.
 //!
-//! From one view to another robot and target turn by the same angle, wherever camera and target sit and whichever way the
-//! poses map: with `A` of the robot and `C` of the target as the camera sees it, `A_i⁻¹ A_j X = X C_i C_j⁻¹`, and a rotation
-//! has the angle of every rotation that it is similar to (Shiu and Ahmad 1989, the rotational part of AX = XB). So all units of
-//! length, directions and places of the camera are one case here, and no equations are solved.
+//! From one view to another robot and target turn by the same angle, whatever the places of camera and target and the direction
+//! in which the poses map: with `A` of the robot and `C` of the target as the camera sees it, `A_i⁻¹ A_j X = X C_i C_j⁻¹`, and
+//! a rotation has the angle of every rotation that it is similar to (Shiu and Ahmad 1989, the rotational part of AX = XB). So
+//! all units of length, directions and places of the camera are one case here, and no equations are solved.
 
 use super::{EXPLAINED_RAD, Hypothesis};
 use crate::handeye::subset;
@@ -13,10 +13,10 @@ const MOST_VIEWS: usize = 20;
 /// With this many times the difference of the best a hypothesis is not ruled out, so that something is listed where nothing
 /// explains.
 const NEAR: f64 = 2.0;
-/// Of all pairs of views this part decides: half of the views may be wrong.
+/// This part of all pairs of views decides: half of the views may be wrong.
 const PART: f64 = 0.25;
 
-/// By how much the angles differ by which robot and target turn, radians: that of the better quarter of the pairs of views.
+/// Difference between the angles by which robot and target turn, radians: that of the better quarter of the pairs of views.
 /// `None` with one view.
 pub fn unlike_rad(h: &impl Hypothesis) -> Option<f64> {
     let turns = &h.target().turns;
@@ -38,7 +38,8 @@ pub fn unlike_rad(h: &impl Hypothesis) -> Option<f64> {
     unlike.get((PART * unlike.len() as f64) as usize).copied()
 }
 
-/// How unlike robot and target may turn, radians, where they do so by `least_rad` under the best hypothesis.
+/// Largest difference between the turns of robot and target, radians, where it is `least_rad` under the best
+/// hypothesis.
 pub fn limit_rad(least_rad: f64) -> f64 {
     // Without anything to compare, which is infinite, nothing is ruled out.
     (NEAR * least_rad).max(EXPLAINED_RAD)

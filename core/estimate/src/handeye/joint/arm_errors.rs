@@ -1,25 +1,25 @@
-//! Errors of the arm itself: angles and lengths of its links, and what its joints give way by under gravity.
+//! Errors of the arm itself: angles and lengths of its links, and the compliance of its joints under gravity.
 //!
 //! # What it estimates
-//! Of every joint behind the first the direction of its axis (two angles) and its place (two lengths); of every joint between the
-//! first and the last its zero; of every joint behind the first how far it gives way. For revolute joints these are a complete
-//! description of a chain: where two axes are parallel, the two angles are those of Hayati. Some of it can be told in two ways (a
-//! zero as a turn of all axes behind it); which one counts is decided by what each is likely to be.
+//! For every joint behind the first the direction of its axis (two angles) and its place (two lengths); for every joint between
+//! the first and the last its zero; for every joint behind the first its compliance. For revolute joints these are a complete
+//! description of a chain: where two axes are parallel, the two angles are those of Hayati. Some errors can be expressed in two
+//! ways (a zero as a turn of all axes behind it); their priors decide between them.
 //!
-//! The first joint's axis and zero, and the last joint's zero, are in the two rigid links of the calibration: no view tells one
-//! from the other. They are zero here by convention.
+//! The first joint's axis and zero, and the last joint's zero, are in the two rigid links of the calibration: no view separates
+//! one from the other. They are zero here by convention.
 //!
 //! # Model
 //! With `T_j = tip_from_joint_j` at the reported pose, the true tip pose is `reported · Π_j T_j e_j T_j⁻¹`, exactly, where `e_j` is
 //! the error of joint `j` in its frame at rest (`P_j` becomes `P_j e_j` in the product `Π P_j M_j(q_j)`): a displacement of its
-//! place, and a rotation of its axis and zero. It needs no angles: the frames of a view say all that the errors depend on.
+//! place, and a rotation of its axis and zero. It needs no angles: the frames of a view hold all that the errors depend on.
 //!
-//! What a joint gives way by is its compliance times the torque of gravity about its axis, over the largest that it could be.
-//! Where masses are not known every joint and the tip weigh alike, and the base's z axis is vertical.
+//! The deflection of a joint is its compliance times the torque of gravity about its axis, over the largest that it could be.
+//! As masses are not known every joint and the tip weigh the same, and the base's z axis is vertical.
 //!
 //! The numbers are random effects with three levels (angles, lengths, compliance), which are found and integrated as all other
-//! noise is, under what is known of arms ([`LEVELS_OF_ARMS`]). Where the views show that something else changes smoothly with the place
-//! of the tip, a field ([`PoseDependentError`]) is between the tip by its links and the true one.
+//! noise is, under what is known of arms ([`LEVELS_OF_ARMS`]). Where the views show that something else changes smoothly with the
+//! place of the tip, a field ([`PoseDependentError`]) is between the tip by its links and the true one.
 //!
 //! # Reference
 //! Hayati & Mirmirani 1985, "Improving the absolute positioning accuracy of robot manipulators" (parallel axes); Mooring, Roth &
@@ -34,11 +34,11 @@ use handeye_geometry::se3;
 use handeye_geometry::targets::observation::View;
 
 /// Levels that arms have, before any data: of angles \[rad\], lengths \[m\] and compliance \[rad where all of the arm is stretched
-/// out\]. A level `s` about such an `s_0` has the density of Cauchy's distribution, `1 / (1 + (s / s_0)²)`: an exact arm has a level
-/// of nothing, and a cheap one of tens of it.
+/// out\]. A level `s` with such an `s_0` has the density of a Cauchy distribution, `1 / (1 + (s / s_0)²)`: an exact arm has a level
+/// of zero, and a cheap one tens of `s_0`.
 ///
 /// The factory calibrations of 17 arms of Universal Robots have medians of 0.03 to 0.17° and 0.03 to 0.4 mm a parameter; a cobot
-/// gives way by some millimetres under what it may carry.
+/// deflects by some millimetres under its payload.
 pub const LEVELS_OF_ARMS: [f64; 3] = [0.1 * std::f64::consts::PI / 180.0, 2e-4, 0.05 * std::f64::consts::PI / 180.0];
 
 /// Number of levels.
@@ -57,7 +57,7 @@ pub enum LinkError {
     ShiftX,
     /// The same along y.
     ShiftY,
-    /// What it gives way by where gravity turns it with the whole weight behind it, radians.
+    /// Its deflection where gravity turns it with the whole weight behind it, radians.
     Compliance,
 }
 
@@ -71,7 +71,8 @@ impl LinkError {
         }
     }
 
-    /// What a unit of it does in the frame of the joint, where gravity turns the joint with a part of what it could.
+    /// The effect of a unit of it in the frame of the joint, where gravity turns the joint with a part `torque` of the
+    /// largest torque.
     fn unit(self, torque: f64) -> Vector6<f64> {
         let mut unit = Vector6::zeros();
         let (place, value) = match self {
@@ -92,12 +93,12 @@ impl LinkError {
 pub struct ArmParameter {
     /// The joint, counted from 0.
     pub joint: usize,
-    /// What about it.
+    /// The kind of error.
     pub error: LinkError,
 }
 
-/// What can be off about an arm with so many joints, in the order in which it is estimated: all angles, all lengths, all
-/// compliances.
+/// What can be off about an arm with this many joints, in the order in which it is estimated: all angles, all lengths,
+/// all compliances.
 pub fn arm_parameters(joints: usize) -> Vec<ArmParameter> {
     let of = |errors: &'static [LinkError]| {
         let all = (1..joints).flat_map(move |joint| errors.iter().map(move |&error| ArmParameter { joint, error }));
@@ -111,9 +112,9 @@ pub fn arm_parameters(joints: usize) -> Vec<ArmParameter> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmErrors {
     joints: usize,
-    /// In the order of [`arm_parameters`].
+    /// The values in the order of [`arm_parameters`].
     values: Vec<f64>,
-    /// What changes smoothly with the place of the tip and is no error of a link.
+    /// The error that changes smoothly with the place of the tip and is not an error of a link.
     field: Option<PoseDependentError>,
 }
 
@@ -122,28 +123,28 @@ pub struct ArmErrors {
 pub struct TrueTip {
     /// `reported_from_true`
     pub reported_from_true: Isometry3<f64>,
-    /// The twists `[t; r]` on its right by which it turns with the errors, in the order of [`ArmErrors::numbers`].
+    /// The twists `[t; r]` on its right by which it changes with the errors, in the order of [`ArmErrors::numbers`].
     pub by_errors: Matrix6xX<f64>,
 }
 
 impl ArmErrors {
-    /// None, of an arm with so many joints.
+    /// No errors, of an arm with this many joints.
     pub fn none(joints: usize) -> Self {
         Self { joints, values: vec![0.0; arm_parameters(joints).len()], field: None }
     }
 
-    /// With these values, in the order of [`arm_parameters`]; `None` for another number of them.
+    /// Errors with these values, in the order of [`arm_parameters`]; `None` for another number of them.
     pub fn new(joints: usize, values: Vec<f64>) -> Option<Self> {
         (values.len() == arm_parameters(joints).len()).then_some(Self { joints, values, field: None })
     }
 
-    /// The same with a part that changes with the place of the tip and is no error of a link, or without one.
+    /// The same with a part that changes with the place of the tip and is not an error of a link, or without one.
     #[must_use]
     pub fn with_field(self, field: Option<PoseDependentError>) -> Self {
         Self { field, ..self }
     }
 
-    /// That part.
+    /// The part that changes smoothly with the place of the tip.
     pub fn field(&self) -> Option<&PoseDependentError> {
         self.field.as_ref()
     }
@@ -153,7 +154,7 @@ impl ArmErrors {
         self.joints
     }
 
-    /// Of the links and joints, in the order of [`arm_parameters`]: radians and metres.
+    /// Errors of the links and joints, in the order of [`arm_parameters`]: radians and metres.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
@@ -173,18 +174,18 @@ impl ArmErrors {
         self.field.as_ref().map_or(0, |field| field.slopes().len())
     }
 
-    /// In the order of [`numbers`](Self::numbers).
+    /// The numbers in the order of [`numbers`](Self::numbers), to be changed.
     pub(crate) fn numbers_mut(&mut self) -> impl Iterator<Item = &mut f64> {
         self.field.iter_mut().flat_map(PoseDependentError::slopes_mut).chain(&mut self.values)
     }
 
-    /// How many values have which level.
+    /// Number of values with each level.
     pub(crate) fn counts(&self) -> [usize; KINDS] {
         let parameters = arm_parameters(self.joints);
         std::array::from_fn(|kind| parameters.iter().filter(|parameter| parameter.error.kind() == kind).count())
     }
 
-    /// Where the tip of a view really is; the same frames as reported where the view does not know its joints.
+    /// Where the tip of a view really is; as reported where the view has no joint values.
     pub(crate) fn of_view(&self, view: &View) -> TrueTip {
         self.true_tip(&view.base_from_tip, &view.tip_from_joints)
     }
@@ -208,7 +209,7 @@ impl ArmErrors {
             by_errors.columns_mut(0, slopes).copy_from(&columns);
             reported_from_true = correction_transform(&correction);
         }
-        // From the last joint to the first: what a joint does at the tip is seen through the errors behind it.
+        // From the last joint to the first: the effect of a joint at the tip is carried through the errors behind it.
         for joint in (1..self.joints).rev() {
             let tip_from_joint = tip_from_joints[joint];
             let through =
@@ -239,7 +240,7 @@ impl ArmErrors {
         field.map_or(by_links, |field| by_links * correction_transform(&field.correction(base_from_tip)))
     }
 
-    /// What each joint is displaced by in its frame at rest, without what gravity does and without the field.
+    /// Displacement of each joint in its frame at rest, without the effect of gravity and without the field.
     pub(crate) fn at_rest(&self) -> Vec<Isometry3<f64>> {
         let weightless = vec![0.0; self.joints];
         self.of_joints(&arm_parameters(self.joints), &weightless).iter().map(correction_transform).collect()
@@ -255,12 +256,13 @@ impl ArmErrors {
     }
 }
 
-/// What an error in the frame of a joint does at the tip.
+/// The effect at the tip of an error in the frame of a joint.
 fn moved_by(error: &Vector6<f64>, tip_from_joint: &Isometry3<f64>) -> Isometry3<f64> {
     tip_from_joint * correction_transform(error) * tip_from_joint.inverse()
 }
 
-/// The torques of gravity about the joints, over the largest that they could be, where every joint and the tip weigh alike.
+/// The torques of gravity about the joints, over the largest that they could be, where every joint and the tip weigh the
+/// same.
 fn torques(base_from_tip: &Pose<Base, Tip>, tip_from_joints: &[Isometry3<f64>]) -> Vec<f64> {
     let down = base_from_tip.isometry().rotation.inverse() * -Vector3::z();
     let mut places: Vec<Vector3<f64>> = tip_from_joints.iter().map(|joint| joint.translation.vector).collect();
@@ -325,7 +327,7 @@ mod tests {
 
     #[test]
     fn it_is_the_product_with_an_error_in_every_frame_at_rest() {
-        // P_1 M_1 P_2 M_2 … F with the errors put where they are, by the motions themselves.
+        // P_1 M_1 P_2 M_2 … F with the errors inserted at their joints, by the motions themselves.
         let rest = |j: usize| se3::exp(&Vector6::from_fn(|i, _| ((7 * j + i) as f64).cos() * 0.5));
         let angle = |j: usize| 0.3 * j as f64 - 0.7;
         let motion = |j: usize| se3::exp(&(Vector6::ith(5, angle(j))));

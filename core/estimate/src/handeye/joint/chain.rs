@@ -26,7 +26,7 @@ pub fn correction_transform(correction: &Vector6<f64>) -> Isometry3<f64> {
     )
 }
 
-/// How a correction turns on its right with its own numbers: `E(d + δ) = E(d) exp(J δ)`.
+/// Right Jacobian of a correction with respect to its own numbers: `E(d + δ) = E(d) exp(J δ)`.
 pub(super) fn correction_jacobian(correction: &Vector6<f64>) -> Matrix6<f64> {
     let phi = correction.fixed_rows::<3>(3).into_owned();
     let rotation = correction_transform(correction).rotation.to_rotation_matrix();
@@ -36,16 +36,15 @@ pub(super) fn correction_jacobian(correction: &Vector6<f64>) -> Matrix6<f64> {
     jacobian
 }
 
-/// `camera_from_target` of one view at the current estimate, and how it turns with the unknowns:
-/// `camera_from_target * exp(xi)` with `xi = by_hand_eye * x + y + by_correction * d + by_arm * q`, where `x` and `y`
-/// perturb `mount_from_camera` and `anchor_from_target` on the right, `d` is added to the correction and `q` to the errors of the
-/// arm.
+/// `camera_from_target` of one view at the current estimate, and its derivatives with respect to the unknowns:
+/// `camera_from_target * exp(xi)` with `xi = by_hand_eye * x + y + by_correction * d + by_arm * q`, where `x` and `y` perturb
+/// `mount_from_camera` and `anchor_from_target` on the right, `d` is added to the correction and `q` to the errors of the arm.
 #[derive(Debug, Clone)]
 pub struct Chain {
     pub camera_from_target: Isometry3<f64>,
     pub by_hand_eye: Matrix6<f64>,
     pub by_correction: Matrix6<f64>,
-    /// Without columns where the arm has no errors.
+    /// Derivatives by the errors of the arm; without columns where it has none.
     pub by_arm: Matrix6xX<f64>,
 }
 
@@ -61,7 +60,7 @@ impl Chain {
         Self::with_arm(mode, &view, None, correction, mount_from_camera, anchor_from_target)
     }
 
-    /// With errors of the arm as well.
+    /// The chain with errors of the arm as well.
     pub fn with_arm(
         mode: Mode,
         view: &View,

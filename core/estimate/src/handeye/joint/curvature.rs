@@ -1,11 +1,11 @@
-//! What the covariance at the optimum leaves out when the cost is no parabola.
+//! What the covariance at the optimum leaves out when the cost is not quadratic.
 //!
 //! With a free lens and few views the lens trades against place and orientation of the camera, and how well it is known
-//! depends on what it is: a small distortion that is estimated as a wavy one seems to say where the principal point is. Two
+//! depends on its values: a small distortion that is estimated as a wavy one seems to determine the principal point. Two
 //! effects of second order make the covariance too small:
 //!
-//! - The covariance is taken at the estimate, and not at the truth. By a Taylor series its mean is off by
-//!   `½ Σ ∂²C / ∂u_k²` over directions `u_k` of lens and target that are one standard deviation long; that much is taken off again.
+//! - The covariance is taken at the estimate, not at the true values. By a Taylor series its mean is off by `½ Σ ∂²C / ∂u_k²` over
+//!   directions `u_k` of lens and target that are one standard deviation long; that much is subtracted.
 //! - Along each principal axis of the error at a point the point is moved, all other unknowns follow to their optimum (the
 //!   profile of the likelihood), and where minus twice its log has risen by the 95 % quantile of chi-square with one degree
 //!   of freedom is the true end of the interval. The covariance is stretched along the axis to the farther of both ends.
@@ -26,18 +26,18 @@ use crate::handeye::{HandEyeError, determined};
 use handeye_geometry::point_error;
 use handeye_geometry::se3;
 
-/// Views above which the cost is a parabola as far as it matters: with 0.3 px the two effects add a third to the variance at
-/// ten views, a fifth at twenty and a twentieth at forty.
+/// Views above which the cost is quadratic for practical purposes: with 0.3 px the two effects add a third to the variance
+/// at ten views, a fifth at twenty and a twentieth at forty.
 const MANY_VIEWS: usize = 40;
 /// Standard deviations of the lens over which second differences are taken: what they leave of the fourth derivative counts a
 /// twelfth of the square of it, a fiftieth.
 const DIFFERENCE: f64 = 0.5;
-/// The covariance is at most doubled by what its place is off; a series that asks for more does not hold.
+/// The covariance is at most doubled because of the place where it is taken; a series that requires more does not hold.
 const MOST_ADDED: f64 = 1.0;
 /// 95 % quantile of chi-square with one degree of freedom.
 const RISE: f64 = 3.841_459;
-/// Axes of less than this part of the longest one's variance do not count: by the parabola the error would be a fortieth
-/// shorter without such an axis.
+/// Axes of less than this part of the longest one's variance do not count: by the quadratic cost the error would be a
+/// fortieth shorter without such an axis.
 const SHORT: f64 = 0.05;
 /// Gauss–Newton steps at one place, and the step in standard deviations that ends them.
 const STEPS: usize = 6;
@@ -45,7 +45,8 @@ const SMALL: f64 = 1e-2;
 /// Places that are tried on each side, and the part of the rise that is near enough.
 const PLACES: usize = 3;
 const NEAR: f64 = 0.05;
-/// Farthest end in terms of the parabola's: a cost that has not risen there has no end that an ellipse could state.
+/// Farthest end in terms of that of the quadratic cost: a cost that has not risen there has no end that an ellipse
+/// could state.
 const FARTHEST: f64 = 4.0;
 
 /// An optimum and the covariance of the shared unknowns there.
@@ -59,8 +60,8 @@ pub struct Optimum<'a> {
 }
 
 impl Optimum<'_> {
-    /// Makes a covariance of the shared unknowns, which noise levels may have made larger than that of the optimum, as much
-    /// larger as the shape of the cost asks for. The axes are those of the error at `point`, camera coordinates.
+    /// Makes a covariance of the shared unknowns, which noise levels may have made larger than that of the optimum, larger
+    /// by as much as the shape of the cost requires. The axes are those of the error at `point`, camera coordinates.
     ///
     /// # Errors
     /// [`HandEyeError::Cancelled`].
@@ -75,12 +76,12 @@ impl Optimum<'_> {
         self.stretched(covariance, point)
     }
 
-    /// By how much the mean covariance at an estimate differs from that at the truth; `None` where the series has no terms.
+    /// Difference of the mean covariance at an estimate from that at the true values; `None` where the series has no terms.
     fn off_by_place(&self) -> Result<Option<DMatrix<f64>>, HandEyeError> {
         let form = self.system.layout.form;
         let lens = self.covariance.view((Layout::FORM_AT, Layout::FORM_AT), (form, form)).into_owned();
         let Some(root) = Cholesky::new(lens).map(|factor| factor.l()) else { return Ok(None) };
-        // All unknowns follow the lens as the covariance says.
+        // All unknowns follow the lens as the covariance determines.
         let Some(inverse) = root.clone().try_inverse() else { return Ok(None) };
         let directions = self.covariance.columns(Layout::FORM_AT, form) * inverse.transpose();
         let at_rest = self.reduced.own_steps(&DVector::zeros(self.covariance.nrows()));
@@ -125,8 +126,8 @@ impl Optimum<'_> {
         Ok(covariance)
     }
 
-    /// Where the cost has risen by the quantile, over the `reach` at which a parabola would have, which has the sign of the
-    /// side.
+    /// Where the cost has risen by the quantile, over the `reach` at which a quadratic cost would have; `reach` has the
+    /// sign of the side.
     fn end(&self, along: &Vector6<f64>, reach: f64) -> Result<f64, HandEyeError> {
         let (mut inside, mut outside) = (0.0, 2.0 * FARTHEST);
         let mut place = 1.0;
@@ -147,8 +148,8 @@ impl Optimum<'_> {
         Ok(place)
     }
 
-    /// By how much the cost rises when the hand-eye transform moves so far along a direction and all else follows; `None`
-    /// where there is no optimum.
+    /// By how much the cost rises when the hand-eye transform moves this far along a direction and all else follows;
+    /// `None` where there is no optimum.
     fn rise(&self, along: &Vector6<f64>, wanted: f64) -> Result<Option<f64>, HandEyeError> {
         let start = self.state.mount_from_camera.isometry().inverse();
         let bottom = self.system.cost(self.noise);
@@ -165,7 +166,7 @@ impl Optimum<'_> {
             let left = wanted - moved - direction.dot(&free);
             let step = &free + &follows * (left / direction.dot(&follows));
             if reduced.length(&step) < SMALL {
-                // So near, the cost is its parabola: least at the free step, and all corrections follow.
+                // This near, the cost is quadratic: least at the free step, and all corrections follow.
                 let least = system.cost(self.noise) - reduced.decrease();
                 return Ok(Some(least + reduced.length(&(&step - &free)).powi(2) - bottom));
             }

@@ -9,7 +9,7 @@ use handeye_simulate::session::{camera, trial};
 /// Corners of 0.3 px and a good robot.
 const NOISE: Noise = Noise { corner_px: 0.3, robot_m: 1e-4, robot_rad: 3.5e-4, ..Noise::EXACT };
 
-/// Variance of the error at the reference point, without and with the shape of the cost, for noise levels that are given.
+/// Variance of the error at the reference point, without and with the shape of the cost, for given noise levels.
 fn variances(views: usize, free_lens: bool, seed: u64) -> (f64, f64) {
     let lens = Intrinsics { distortion: Distortion::BrownConrady([-0.08, 0.05, 6e-4, -4e-4, -0.01]), ..camera() };
     let t = trial(Mode::EyeInHand, views, &NOISE, lens, seed);
@@ -29,7 +29,7 @@ fn a_known_lens_leaves_a_parabola() {
     assert!((stated / plain - 1.0).abs() < 1e-9, "{plain} {stated}");
 }
 
-/// At ten views squared errors were 1.37 times what the covariance at the optimum says, in 400 simulated sessions.
+/// At ten views squared errors were 1.37 times that of the covariance at the optimum, in 400 simulated sessions.
 #[test]
 fn a_free_lens_is_stated_less_well_known_with_few_views() {
     let (mut sum, mut larger) = (0.0, 0);
@@ -45,7 +45,8 @@ fn a_free_lens_is_stated_less_well_known_with_few_views() {
     assert!(stated / plain < 1.15, "{}", stated / plain);
 }
 
-/// Few views and a free lens, where the cost is no parabola: the profile is followed to its optimum, not to where it starts.
+/// Few views and a free lens, where the cost is not quadratic: the profile is followed to its optimum, not to where it
+/// starts.
 #[test]
 fn the_rise_along_a_direction_is_that_of_the_optimum_there() {
     let lens = Intrinsics { distortion: Distortion::BrownConrady([-0.08, 0.05, 6e-4, -4e-4, -0.01]), ..camera() };
@@ -84,7 +85,7 @@ fn the_rise_along_a_direction_is_that_of_the_optimum_there() {
         }
         let at_end = System::new(&problem, &held, &cancel).expect("solves").cost(&NOISE) - system.cost(&NOISE);
         println!("{times}: {rise:.5}, by many steps {at_end:.5}, of a parabola {:.5}", times * times);
-        // A step of a hundredth that is not taken again leaves a part in ten thousand of a unit, and its cube.
+        // A step of a hundredth that is not taken again leaves one part in ten thousand, and its cube.
         assert!((rise / at_end - 1.0).abs() < 1e-3, "{rise} {at_end}");
         assert!((at_end / (times * times) - 1.0).abs() > 0.01, "{at_end}: a parabola would do");
     }

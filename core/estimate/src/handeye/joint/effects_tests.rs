@@ -13,8 +13,8 @@ fn covariance_px2(corner: usize) -> Matrix2<f64> {
     if corner.is_multiple_of(3) { Matrix2::new(0.01, 0.004, 0.004, 0.02) } else { Matrix2::identity() * 0.04 }
 }
 
-/// Where corners share nothing their covariance together says what those of single corners say: the answer, and what the equations
-/// of every effect are.
+/// Where corners share no noise their joint covariance is equivalent to those of single corners: in the answer and in the
+/// equations of every effect.
 #[test]
 fn corners_that_share_nothing_count_together_as_each_for_itself() {
     let cancel = CancelToken::default();
@@ -64,7 +64,7 @@ fn corners_that_share_nothing_count_together_as_each_for_itself() {
         assert!((&a.information - &b.information).amax() < 1e-5 * a.information.amax());
         assert!((&a.gradient - &b.gradient).amax() < 1e-5 * a.gradient.amax());
     }
-    // All views together say of the coefficients of an effect what its equations do.
+    // The scores of all views add up to the equations of the effect.
     let all = scores_of_each.iter().map(|score| score.information.clone()).reduce(|a, b| a + b).expect("views");
     let pull = -scores_of_each.iter().map(|score| score.gradient.clone()).reduce(|a, b| a + b).expect("views");
     let [distortion, print] = of_each;

@@ -1,9 +1,9 @@
-//! Where points of the target are expected in the image of a view that was not taken, and how surely.
+//! Where points of the target are expected in the image of a view that was not taken, and with what uncertainty.
 //!
-//! With the shared unknowns `s` of covariance `C` and the error `d` of the robot, a pixel turns by `J s + J_d d`, so its
+//! With the shared unknowns `s` of covariance `C` and the error `d` of the robot, a pixel moves by `J s + J_d d`, so its
 //! covariance is `J C Jᵀ + J_d Σ J_dᵀ`. Links, lens and the robot's field count together: a focal length that is too long and a
-//! camera that is too far away are hardly told apart by small turns, and in a view like those that were taken they make up
-//! for each other, in another one they do not.
+//! camera that is too far away are hardly separated by small turns, and in a view like those that were taken they compensate
+//! each other, in another one they do not.
 
 use nalgebra::{DMatrix, Isometry3, Matrix2xX, Matrix6, Matrix6xX, Point3, SMatrix, Vector2};
 
@@ -19,9 +19,9 @@ use handeye_geometry::se3::skew;
 pub struct ExpectedPixels<'a> {
     intrinsics: &'a Intrinsics,
     camera_from_target: Isometry3<f64>,
-    /// How the pose of the target turns with the shared unknowns; nothing with those of the lens.
+    /// Jacobian of the pose of the target by the shared unknowns; zero for those of the lens.
     by_shared: Matrix6xX<f64>,
-    /// Unknowns of the lens.
+    /// Number of unknowns of the lens.
     lens: usize,
     covariance: &'a DMatrix<f64>,
     /// Covariance of the pose by the robot's noise.
@@ -61,7 +61,8 @@ impl<'a> ExpectedPixels<'a> {
         &self.camera_from_target
     }
 
-    /// The pixel of a point of the target \[m\], and its standard deviations along x and y, pixels; `None` where the lens has none.
+    /// The pixel of a point of the target \[m\], and its standard deviations along x and y, pixels; `None` where the lens gives no
+    /// pixel.
     pub fn of(&self, point: &Point3<f64>) -> Option<(Vector2<f64>, Vector2<f64>)> {
         let seen = self.intrinsics.project_with_jacobians(&(self.camera_from_target * point)).ok()?;
         let turn = self.camera_from_target.rotation.to_rotation_matrix();

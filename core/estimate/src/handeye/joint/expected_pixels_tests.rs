@@ -7,7 +7,7 @@ use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_geometry::testing::BOARD;
 use handeye_simulate::session::{REALISTIC, camera, trial};
 
-/// Where a model has a point of the board in a view.
+/// Where a model puts a point of the board in a view.
 fn pixel(model: &ViewModel, base_from_tip: &Pose<Base, Tip>, point: &Point3<f64>) -> nalgebra::Vector2<f64> {
     let seen = model.camera_from_target(&(*base_from_tip).into()).isometry() * point;
     model.intrinsics().project(&seen).expect("in front of the camera")
@@ -51,7 +51,7 @@ fn a_pixel_is_as_unsure_as_it_moves_with_what_is_unsure() {
     }
 }
 
-/// Links and lens together: what small turns cannot tell apart makes up for itself where they were taken.
+/// Links and lens together: errors that small turns cannot separate compensate each other in views like those taken.
 #[test]
 fn a_view_like_those_taken_is_surer_than_links_and_lens_are_by_themselves() {
     let trial = trial(Mode::EyeInHand, 6, &REALISTIC, camera(), 3);

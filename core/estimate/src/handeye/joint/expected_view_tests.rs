@@ -8,7 +8,7 @@ use handeye_geometry::progress::CancelToken;
 use handeye_geometry::testing::BOARD;
 use handeye_simulate::session::{ArmError, REALISTIC, Setup, add_field, camera, session, trial};
 
-/// Where the estimator is when it is at the model.
+/// The state of the estimator at the model.
 fn state_of(model: &ViewModel, problem: &JointProblem<'_>) -> State {
     let start = JointStart {
         mount_from_camera: model.hand_eye.mount_from_camera(),
@@ -39,7 +39,7 @@ fn what_views_are_expected_to_say_is_what_the_estimator_takes_from_them() {
         let model = ViewModel::new(&calibration, &BOARD).expect("a joint estimate");
         assert_eq!(model.field.is_some(), field, "the data show the field");
 
-        // The same views in the estimator, at the estimate and with nothing said of the corners' weights.
+        // The same views in the estimator, at the estimate and without stated weights of the corners.
         let problem = JointProblem {
             free: model.free,
             noise: Some(*model.noise()),

@@ -1,6 +1,6 @@
-//! What the data are expected to say of the noise levels: Fisher's information of the restricted likelihood.
+//! The expected information of the data on the noise levels: Fisher's information of the restricted likelihood.
 //!
-//! With `V = Σ θ_k V_k` the covariance of all residuals, `X` their derivatives by the unknowns that no level belongs to and
+//! With `V = Σ θ_k V_k` the covariance of all residuals, `X` their derivatives by the unknowns without a level and
 //! `P = V⁻¹ − V⁻¹ X (Xᵀ V⁻¹ X)⁻¹ Xᵀ V⁻¹`, it is `½ θ_k θ_l tr(P V_k P V_l)` by the logs of the variances. None of these
 //! matrices is formed: for effects with the columns `Z`, the variance `θ` and the posterior covariance `C` it is
 //! `Zᵀ P Z = (1 − C / θ) / θ`, and the normal equations give `C` view by view. The corrections of two views have
@@ -21,7 +21,7 @@ use super::view_block::{Layout, PixelWeights, prior_weight};
 /// The level of the poses' part.
 const POSES: usize = 3;
 
-/// Levels that are told by something else than the poses' part.
+/// Levels other than that of the poses' part.
 fn others() -> impl Iterator<Item = usize> {
     (0..LEVELS).filter(|k| *k != POSES)
 }
@@ -35,7 +35,7 @@ pub fn information(system: &System, noise: &Noise, at: &Likelihood, levels: Leve
     for (k, l) in [(0, 0), (0, 1), (1, 1)] {
         traces[(1 + k, 1 + l)] += trace_of_product(&carried[k], &carried[l]);
     }
-    // The rests say something of the form alone.
+    // The rests have information on the form alone.
     let by_form = shared.columns(Layout::FORM_AT, system.layout.form);
     let through = by_form * (system.rest_information() / noise.corner_px.powi(2));
     let of_form = through.rows(Layout::FORM_AT, system.layout.form).into_owned();
@@ -82,7 +82,7 @@ fn of_robot(system: &System, noise: &Noise, at: &Likelihood) -> LevelMatrix {
     let weight = PixelWeights::new(noise).pose;
     let mut out = LevelMatrix::zeros();
     for (block, own) in system.blocks.iter().zip(&at.reduced.own) {
-        // 1 − O⁻¹ in terms of the levels, without the difference of what is nearly equal.
+        // 1 − O⁻¹ in terms of the levels, without the difference of nearly equal numbers.
         let seen = to * own.factor.solve(&(block.own * weight)) * from;
         let follows = own.follows();
         let through = to * follows.tr_mul(&(&at.covariance * &follows)) * to;

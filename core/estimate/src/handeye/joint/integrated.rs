@@ -1,4 +1,4 @@
-//! The covariance with the noise levels integrated out, and on how many degrees of freedom it rests.
+//! The covariance with the noise levels integrated out, and the degrees of freedom on which it rests.
 //!
 //! At levels `θ` the answer is Gaussian with mean `x(θ)` and covariance `C(θ)`. The levels are known as well as the views
 //! show them: their posterior is the restricted likelihood times a weak prior ([`variance::prior`]). The error of the answer
@@ -10,8 +10,8 @@
 //! - its size is such that the 95 % radius at the reference point is that of the mixture;
 //! - `scale` makes the 95 % region of all six numbers that of the mixture, too.
 //!
-//! The mixture has a fixed number of points: a low-discrepancy sequence through Student's t about the most likely levels,
-//! along the axes of the information and with a width of its own on either side, weighed by the posterior over the
+//! The mixture has a fixed number of points: a low-discrepancy sequence mapped by Student's t about the most likely
+//! levels, along the axes of the information and with a separate width on either side, weighed by the posterior over the
 //! density of the points.
 //!
 //! # Reference
@@ -33,20 +33,20 @@ use handeye_geometry::point_error;
 /// Points of the mixture. Over 124 simulated sessions of 4 to 60 views the stated error differs from that of 8,192 points by
 /// 0.7 % RMS, 1.4 % with four views and 0.2 % with twenty; 128 points do no better, 64 half as well.
 const POINTS: usize = 96;
-/// Gain of the posterior that the search for its top stops at: the points are weighed by what it is at each of them, so the
-/// middle that they are spread about need not be exact.
+/// Gain of the posterior below which the search for its maximum stops: the points are weighted by its value at each of
+/// them, so the middle that they are spread about need not be exact.
 const TOP: f64 = 1e-3;
 /// Degrees of freedom of the points' density: tails that no level of three numbers or more exceeds by much.
 const TAILS: f64 = 5.0;
 /// Where the width on a side is taken, in units of the one that the information gives.
 const PROBE: f64 = 2.0;
-/// Widths on a side in those units: beyond them the posterior is no hill.
+/// Widths on a side in those units: beyond them the posterior has no peak.
 const WIDTHS: (f64, f64) = (0.3, 4.0);
 /// Points of less weight than this part of the largest are left out.
 const NO_WEIGHT: f64 = 1e-6;
 /// Views above which the levels count as known: they add less than one part in three hundred.
 const MANY_VIEWS: usize = 300;
-/// Degrees of freedom where the levels cannot be integrated: those of one level that three views tell.
+/// Degrees of freedom where the levels cannot be integrated: those of one level that three views determine.
 const FEWEST: f64 = 3.0;
 /// Degrees of freedom above which nothing changes.
 const MANY: f64 = 1e6;
@@ -73,11 +73,11 @@ pub struct SmallSample {
 }
 
 impl SmallSample {
-    /// Of a Gaussian: the noise levels are known.
+    /// The distribution for known noise levels: Gaussian.
     pub const KNOWN: Self =
         Self { degrees_of_freedom: f64::INFINITY, scale: 1.0, level_sigma: [0.0; 3], level_range: [[0.0; 2]; 3] };
 
-    /// The length that the error of a point stays under with a probability of 95 %, from its covariance, in its unit.
+    /// The length that the error of a point stays below with a probability of 95 %, from its covariance, in its unit.
     pub fn radius_95(&self, covariance: &Matrix3<f64>) -> f64 {
         point_error::radius_95_t(&(covariance / self.scale), self.degrees_of_freedom)
     }
@@ -137,7 +137,7 @@ impl Axes {
         let n = places.len();
         let information = DMatrix::from_fn(n, n, |i, j| information[(places[i], places[j])]);
         let eigen = information.symmetric_eigen();
-        // A level is known to a factor of e⁴ even where the information at one point says nothing.
+        // A level is known to a factor of e⁴ even where the information at one point is zero.
         let width = eigen.eigenvalues.map(|v| v.max(0.25).sqrt().recip());
         Self { places, columns: &eigen.eigenvectors * DMatrix::from_diagonal(&width), widths: vec![[1.0; 2]; n] }
     }
@@ -168,7 +168,7 @@ impl Axes {
 struct Point {
     weight: f64,
     logs: Logs,
-    /// Of the shared unknowns.
+    /// Information on the shared unknowns.
     information: DMatrix<f64>,
     covariance: DMatrix<f64>,
     step: DVector<f64>,
@@ -234,7 +234,7 @@ fn scatter(points: &[Point]) -> LevelMatrix {
     points.iter().map(|point| (point.logs - mean) * (point.logs - mean).transpose() * point.weight).sum()
 }
 
-/// Where a level is with a probability of 95 %.
+/// Range that a level is in with a probability of 95 %.
 fn range(points: &[Point], level: usize) -> [f64; 2] {
     let mut sorted: Vec<(f64, f64)> = points.iter().map(|point| (point.logs[level], point.weight)).collect();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -260,7 +260,7 @@ fn shape(points: &[Point]) -> Option<DMatrix<f64>> {
     Some(normal::covariance_of(&information)? + shifts)
 }
 
-/// What the points say of the hand-eye transform.
+/// The distribution of the hand-eye transform by the points.
 struct Mixture {
     /// Weight and covariance of the error at the reference point, the shift of the mean in it.
     of_point: Vec<(f64, Matrix3<f64>)>,
@@ -324,7 +324,7 @@ impl Mixture {
     }
 }
 
-/// Share of errors within what is stated.
+/// Share of errors within the stated one.
 const LEVEL: f64 = 0.95;
 
 #[cfg(test)]

@@ -9,14 +9,14 @@ use handeye_simulate::session::{Session, camera, trial};
 /// 0.5 mm and 0.1°, far above what the corners leave open.
 const ROBOT: Noise = Noise { corner_px: 0.03, robot_m: 5e-4, robot_rad: 1.7e-3, ..Noise::EXACT };
 
-/// How far the answer puts its reference point from where it is, metres.
+/// Distance of the reference point by the answer from its true place, metres.
 fn miss(t: &Session, found: &crate::handeye::joint::JointSolution) -> f64 {
     let by_truth = found.hand_eye.mount_from_camera().isometry().inverse() * t.mount_from_camera.isometry();
     (by_truth * found.reference_point - found.reference_point).norm()
 }
 
-/// Four views tell a level of the robot by six numbers or so. By a Gaussian the error is inside in some 80 % of sessions. Of
-/// 160 sessions at 95 % fewer than 143 are inside by chance one time in two thousand.
+/// Four views determine a level of the robot by six numbers or so. By a Gaussian the error is inside in some 80 % of
+/// sessions. Of 160 sessions at 95 % fewer than 143 are inside by chance one time in two thousand.
 #[test]
 fn the_error_of_four_views_is_covered() {
     let (mut inside, mut by_gaussian, mut levels) = (0, 0, [0; 2]);
@@ -40,7 +40,7 @@ fn the_error_of_four_views_is_covered() {
     assert!(by_gaussian < 143, "{by_gaussian}: the test does not tell");
 }
 
-/// Levels that hundreds of numbers tell change nothing.
+/// Levels that hundreds of numbers determine change nothing.
 #[test]
 fn many_views_give_the_gaussian() {
     let t = trial(Mode::EyeInHand, 150, &ROBOT, camera(), 1);
@@ -52,7 +52,7 @@ fn many_views_give_the_gaussian() {
     assert!(found.small_sample.degrees_of_freedom > 150.0, "{}", found.small_sample.degrees_of_freedom);
 }
 
-/// The mixture with a field has six levels; its points must not run away.
+/// The mixture with a field has six levels; its points must not diverge.
 #[test]
 fn levels_of_a_field_are_integrated_too() {
     let noise = Noise { field_m: 2e-3, field_rad: 3.5e-3, ..ROBOT };

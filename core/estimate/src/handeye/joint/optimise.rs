@@ -8,7 +8,7 @@ use handeye_geometry::progress::CancelToken;
 
 /// Steps of one minimisation; a handful is usual.
 const MAX_STEPS: usize = 100;
-/// Ends when the quadratic model promises less than this part of the cost.
+/// Ends when the quadratic model predicts a decrease of less than this part of the cost.
 const COST_TOLERANCE: f64 = 1e-12;
 /// Damping of the first step from a start that may be far off, relative to the diagonal.
 pub const FAR: f64 = 1e-4;
@@ -54,8 +54,8 @@ pub fn minimise(
             if promised <= COST_TOLERANCE * cost.max(f64::MIN_POSITIVE) {
                 return Ok((system, step));
             }
-            // Two systems of many views are half of all memory, and few steps are refused, so the place that was left is
-            // linearised once more for these.
+            // Two systems of many views are half of all memory, and few steps are refused, so the previous state is
+            // linearised once more for those.
             drop(system);
             match determined(System::new(problem, &next, cancel))? {
                 Some(next_system) if next_system.cost(noise) < cost => {

@@ -5,7 +5,7 @@
 //! of the corners.
 //!
 //! A corner is left out as an outlier when its residual, its view's own pose being free, is several times what nine in ten corners
-//! have; so long tails of honest noise are kept.
+//! have; so long tails of ordinary noise are kept.
 
 use std::ops::Range;
 
@@ -26,7 +26,7 @@ use handeye_geometry::statistics::pooled_freedom;
 use handeye_geometry::targets::observation::{Corner, View};
 use handeye_geometry::view_equations::{FreeParameters, PoseEquations};
 
-/// An estimate and what it was made without.
+/// An estimate and what was left out of it.
 #[derive(Debug, Clone)]
 pub struct Screened {
     /// The estimate from the views in the fit; its views are those, in their order.
@@ -48,12 +48,12 @@ impl Screened {
     }
 }
 
-/// Estimates from the views that belong together. `own` are the target's poses by the corners of each view alone, as PnP
-/// gives them.
+/// Estimates from the views that agree. `own` are the target's poses by the corners of each view alone, as PnP gives
+/// them.
 ///
 /// With fewer than six views, or when too many would have to go, all are kept.
 ///
-/// The covariance is that of noise levels as if they were known.
+/// The covariance takes the noise levels as known.
 ///
 /// # Errors
 /// As [`estimate`](super::estimate).
@@ -90,7 +90,7 @@ impl Estimator for OfViews<'_> {
             return fit(&JointProblem { views: self.views, ..*self.problem }, self.start, self.work);
         }
         let chosen: Vec<View> = kept.iter().map(|&i| self.views[i].clone()).collect();
-        // Noise levels of other views are no start: their likelihood may have another maximum near them.
+        // Noise levels of other views are not a start: their likelihood may have another maximum near them.
         let start = JointStart { noise: None, ..near.map_or(*self.start, JointSolution::as_start) };
         fit(&JointProblem { views: &chosen, ..*self.problem }, &start, self.work.cancel)
     }
@@ -100,7 +100,8 @@ impl Estimator for OfViews<'_> {
     }
 }
 
-/// How far the target's own pose in every view is from where the start puts it, metres; angles count at its distance.
+/// Distance of the target's own pose in every view from the one that the start predicts, metres; angles count at its
+/// distance.
 fn misfits(problem: &JointProblem<'_>, start: &JointStart, views: &[View], own: &[Pose<Camera, Target>]) -> Vec<f64> {
     let state = State::new(&JointProblem { views, ..*problem }, start);
     let centre = centre(problem, start);
@@ -118,7 +119,7 @@ fn centre(problem: &JointProblem<'_>, start: &JointStart) -> nalgebra::Point3<f6
     (sum / points.len().max(1) as f64).into()
 }
 
-/// How far two poses put a point apart, metres, and the angle between them.
+/// Distance between the places where two poses put a point, metres, and the angle between them.
 fn apart(a: &Isometry3<f64>, b: &Isometry3<f64>, point: &nalgebra::Point3<f64>) -> (f64, f64) {
     ((a * point - b * point).norm(), a.rotation.angle_to(&b.rotation))
 }
@@ -134,7 +135,7 @@ fn distances(
     let system = &*solution.system;
     let covariance = system.reduce(&solution.noise)?.inverse();
     let layout = system.layout;
-    // What is known of an unknown beforehand takes no residuals to find.
+    // What is known of an unknown beforehand uses up no residuals.
     let determined = layout.count() as f64 - system.prior_trace(&solution.noise, &covariance);
     let freedom = 0.5 * (6.0 * kept.len() as f64 - determined);
     let of_noise = freedom.max(4.0);
@@ -168,11 +169,12 @@ fn distances(
         let own = chain.by_correction * Matrix6::from_diagonal(&robot) * chain.by_correction.transpose()
             + factor.inverse() * resolution::pose_variance_px2(in_pixels, view.corners.len());
         let expected = if kept.binary_search(&i).is_ok() { own - shared } else { own + shared };
-        // A view that the others do not determine has nothing to disagree with.
+        // Where the others do not determine a view it cannot disagree with them.
         let expected = Cholesky::new(expected).or_else(|| Cholesky::new(own));
         let squared = expected.as_ref().map_or(f64::INFINITY, |v| error.dot(&v.solve(&error)));
         let freedom = expected.map_or(of_noise, |v| {
-            // By the log of their variance `v`, what is expected changes by `B C_s C_sᵀ Bᵀ / v` with the slopes.
+            // The derivative of the expected covariance by the log of the variance `v` of the slopes is
+            // `B C_s C_sᵀ Bᵀ / v`.
             let share = |(part, variance, _): &(Range<usize>, f64, f64)| {
                 let with = &by_shared * covariance.columns(part.start, part.len());
                 v.solve(&Matrix6::from_iterator((&with * with.transpose()).iter().copied())).trace() / (6.0 * variance)
@@ -186,8 +188,8 @@ fn distances(
     Ok(judged.collect())
 }
 
-/// The effects of each kind, slopes of the robot's field and errors of its arm: where they are among the shared unknowns, their variance, and on
-/// how many of them, which the data determine, that rests.
+/// The effects of each kind, slopes of the robot's field and errors of its arm: where they are among the shared unknowns, their
+/// variance, and the number of them determined by the data, on which it rests.
 fn slopes(system: &System, noise: &Noise, covariance: &DMatrix<f64>) -> Vec<(Range<usize>, f64, f64)> {
     let kinds = system.layout.effects().into_iter().zip(levels_of_effects(noise));
     let kinds = kinds.filter(|(part, _)| !part.is_empty()).map(|(part, sigma)| {

@@ -24,7 +24,7 @@ fn screened(t: &Session) -> Screened {
 
 #[test]
 fn healthy_sessions_keep_their_views() {
-    // One session in a hundred may lose a view; of thirty none or one does in 96 of 100 choices of seeds.
+    // One session in a hundred may lose a view; of thirty at most one does in 96 of 100 choices of seeds.
     let mut lost = 0;
     for (views, seed) in [(10, 500), (20, 600), (40, 700)] {
         for k in 0..10 {
@@ -96,8 +96,8 @@ fn one_grossly_wrong_view_of_ten_does_not_lead_the_fit_astray() {
 
 #[test]
 fn one_wrong_view_of_ten_cannot_hide_behind_the_noise_it_makes() {
-    // Wrong in translation alone: the noise of the robot's position follows it, and within the fit its squared distance is
-    // 3 N = 30, whatever its error; the limit is 33.
+    // An error in translation alone: the noise of the robot's position follows it, and within the fit its squared distance
+    // is 3 N = 30, whatever its error; the limit is 33.
     let exact = super::super::Noise { corner_px: 0.1, robot_m: 0.0, robot_rad: 0.0, ..super::super::Noise::EXACT };
     for (mode, noise) in [(Mode::EyeInHand, exact), (Mode::EyeToHand, exact), (Mode::EyeInHand, REALISTIC)] {
         for seed in 0..5 {
@@ -141,7 +141,7 @@ fn noise_that_all_corners_of_a_view_share_is_found_and_stated() {
 
 #[test]
 fn a_view_farther_out_than_the_others_is_judged_by_a_field_that_reaches_it() {
-    // A robot whose errors are affine in the place, and nothing wrong. The farthest view is judged by a fit without it, whose
+    // A robot whose errors are affine in the place, and no outliers. The farthest view is judged by a fit without it, whose
     // own views end before it.
     let noise = Noise { field_m: 3e-3, field_rad: 5e-3, robot_m: 2e-5, robot_rad: 1e-4, ..REALISTIC };
     let (mut farther, mut beyond) = (Vec::new(), 0);

@@ -1,16 +1,15 @@
-//! Errors of the robot that depend on where it stands: a field that is affine in the place of the tip.
+//! Pose-dependent errors of the robot: a field that is affine in the place of the tip.
 //!
-//! An arm whose links are not as its controller takes them to be is off by amounts that change smoothly over its
-//! workspace. To first order the error of the tip is an affine function of its place in the base: what is wrong near the wrist in the
-//! axes of the tip, what is wrong near the base in the axes of the base. The slopes, eighteen in the axes of a frame, are random effects
-//! with two variances of their own, position and orientation, which are found as those of the noise are (restricted maximum
-//! likelihood). Without them a smooth error of the arm is taken for noise that is independent from view to view, and the stated
-//! uncertainty is too small; or it looks like a board that moved, a target of another size or a wrong lens. Where the data show none,
-//! the model goes without.
+//! An arm whose links differ from its controller's model has errors that change smoothly over its workspace. To first order the
+//! error of the tip is an affine function of its place in the base: errors near the wrist in the axes of the tip, errors near the
+//! base in the axes of the base. The slopes, eighteen in the axes of a frame, are random effects with two variances of their own,
+//! position and orientation, which are found as those of the noise are (restricted maximum likelihood). Without them a smooth error
+//! of the arm is taken for noise that is independent from view to view, and the stated uncertainty is too small; or it looks like a
+//! board that moved, a target of another size or a wrong lens. Where the data show no such error, it is left out of the model.
 //!
-//! By reported poses the slopes are those in the axes of the tip alone ([`IN_TIP`]): commands go without a correction then, and with
-//! more freedom the transform follows the arm where it is exact and leaves the more to commands where it is not. Beside the errors of
-//! an arm, by which commands are corrected, they are in both ([`IN_BOTH`]).
+//! By reported poses the slopes are those in the axes of the tip alone ([`IN_TIP`]): commands are then not corrected, and with more
+//! freedom the transform follows the arm where it is exact and leaves more error to commands where it is not. Together with the
+//! errors of an arm, by which commands are corrected, they are in both ([`IN_BOTH`]).
 //!
 //! Source: Henderson 1975, "Best linear unbiased estimation and prediction under a selection model" (random effects in
 //! the normal equations).
@@ -24,25 +23,25 @@ use handeye_geometry::targets::observation::View;
 
 /// Slopes of errors of one kind in the axes of one frame: along three axes of the base, which are neighbours.
 pub(crate) const PER_FRAME: usize = 9;
-/// Views from which on a field is looked for. With fewer there are not twice as many numbers as unknowns and slopes in the axes of the
-/// tip, and the slopes are the noise. Beside an arm, where slopes and errors of links are more than the numbers of ten views, what is known
-/// of arms stands for what is missing.
+/// Views from which on a field is tested for. With fewer there are not twice as many numbers as unknowns and slopes in the axes of
+/// the tip, and the slopes are the noise. Together with an arm, where slopes and errors of links are more than the numbers of ten
+/// views, prior knowledge of arms supplies what is missing.
 pub const FIELD_VIEWS: usize = 10;
 /// Least spread of the places, RMS, metres: an arm that turns on the spot has no field.
 const LEAST_SPREAD_M: f64 = 1e-3;
 
-/// The places of a session's views, as the field is a function of them.
+/// The places of a session's views, of which the field is a function.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Places {
     mean: Vector3<f64>,
-    /// Length of way per which slopes count: the RMS distance from the mean.
+    /// Length to which slopes refer: the RMS distance from the mean.
     unit_m: f64,
     /// Largest distance from the mean.
     reach_m: f64,
 }
 
 impl Places {
-    /// Of the reported tip poses; `None` where the tip stays where it is.
+    /// The places of the reported tip poses; `None` where the tip stays where it is.
     pub fn of<'a>(poses: impl Iterator<Item = &'a Pose<Base, Tip>> + Clone) -> Option<Self> {
         let count = poses.clone().count() as f64;
         let mean = poses.clone().map(Pose::translation).sum::<Vector3<f64>>() / count;
@@ -57,8 +56,8 @@ impl Places {
         if poses.clone().count() < FIELD_VIEWS { None } else { Self::of(poses) }
     }
 
-    /// Where a pose is for the field. A pose beyond the reach of the session counts as at its edge: nothing is known of the field
-    /// there.
+    /// The place of a pose as argument of the field. A pose beyond the reach of the session counts as at its edge: nothing is
+    /// known of the field there.
     pub fn at(&self, base_from_tip: &Pose<Base, Tip>) -> FieldAt {
         let from_mean = base_from_tip.translation() - self.mean;
         let within = (self.reach_m / from_mean.norm()).min(1.0);
@@ -69,29 +68,29 @@ impl Places {
     }
 }
 
-/// Whose axes an error is in.
+/// The frame whose axes an error is in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Axes {
     Tip,
     Base,
 }
 
-/// A field that goes with reported poses.
+/// A field for reported poses.
 pub(crate) const IN_TIP: &[Axes] = &[Axes::Tip];
-/// A field beside the errors of an arm.
+/// A field together with the errors of an arm.
 pub(crate) const IN_BOTH: &[Axes] = &[Axes::Tip, Axes::Base];
 
-/// A reported pose as the field is a function of it.
+/// A reported pose as argument of the field.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FieldAt {
-    /// From the middle of the session, in the axes of the base and over their spread.
+    /// Place from the middle of the session, in the axes of the base and over their spread.
     place: Vector3<f64>,
     tip_from_base: Matrix3<f64>,
 }
 
 impl FieldAt {
-    /// How something turns with the slopes in the axes of these frames, where `by_robot` is how it turns with the error of the tip: those
-    /// of position, then those of orientation, each frame by frame.
+    /// Jacobian of something by the slopes in the axes of these frames, where `by_robot` is its Jacobian by the error of the tip:
+    /// those of position, then those of orientation, each frame by frame.
     pub fn columns(&self, frames: &[Axes], by_robot: &Matrix6<f64>) -> DMatrix<f64> {
         let half = PER_FRAME * frames.len();
         let mut columns = DMatrix::zeros(6, 2 * half);
@@ -111,9 +110,9 @@ impl FieldAt {
 /// Slopes of errors in the axes of one frame.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Slopes {
-    /// Metres of error per metre of way.
+    /// Metres of error per metre of distance.
     pub position: Matrix3<f64>,
-    /// Radians of error per metre of way, as a rotation vector.
+    /// Radians of error per metre of distance, as a rotation vector.
     pub orientation: Matrix3<f64>,
 }
 
@@ -122,12 +121,13 @@ pub struct Slopes {
 pub struct PoseDependentError {
     places: Places,
     frames: &'static [Axes],
-    /// As the columns of [`FieldAt::columns`]: metres and radians per unit of way.
+    /// In the order of the columns of [`FieldAt::columns`]: metres and radians per unit of distance.
     slopes: Vec<f64>,
 }
 
 impl PoseDependentError {
-    /// By its origin and its reach \[m\] and its slopes, as [`Self::in_tip`] and [`Self::in_base`] give them.
+    /// The field with this origin and reach \[m\] and these slopes, as [`Self::in_tip`] and [`Self::in_base`] give
+    /// them.
     pub fn new(origin_m: Vector3<f64>, reach_m: f64, in_tip: &Slopes, in_base: Option<&Slopes>) -> Self {
         let frames: Vec<&Slopes> = std::iter::once(in_tip).chain(in_base).collect();
         let position = frames.iter().flat_map(|slopes| slopes.position.as_slice());
@@ -150,26 +150,26 @@ impl PoseDependentError {
     }
 
     pub(crate) fn none(places: Places, frames: &'static [Axes]) -> Self {
-        // What all frames make together at a typical distance is, per axis, as large as one slope.
+        // The errors of all frames together at a typical distance are, per axis, as large as one slope.
         let places = Places { unit_m: places.unit_m * (frames.len() as f64).sqrt(), ..places };
         Self { places, frames, slopes: vec![0.0; 2 * PER_FRAME * frames.len()] }
     }
 
-    /// The same slopes, affine as far as these poses go, too: where they are judged by what the field predicts and is uncertain
-    /// by, a field that ends at the edge of the views that it was found from would predict the wrong error there.
+    /// The same slopes, affine out to these poses, too: where poses are judged by the prediction of the field and its
+    /// uncertainty, a field that ends at the edge of the views that it was found from would predict the wrong error there.
     pub(crate) fn reaching<'a>(mut self, poses: impl Iterator<Item = &'a Pose<Base, Tip>>) -> Self {
         let distances = poses.map(|pose| (pose.translation() - self.places.mean).norm());
         self.places.reach_m = distances.fold(self.places.reach_m, f64::max);
         self
     }
 
-    /// How something turns with the slopes at a reported pose, where `by_robot` is how it turns with the error of the tip.
+    /// Jacobian of something by the slopes at a reported pose, where `by_robot` is its Jacobian by the error of the tip.
     pub(crate) fn columns(&self, base_from_tip: &Pose<Base, Tip>, by_robot: &Matrix6<f64>) -> DMatrix<f64> {
         self.places.at(base_from_tip).columns(self.frames, by_robot)
     }
 
-    /// Position first, then orientation; each in the axes of the tip, then in those of the base where there are such; metres and radians
-    /// per [`unit_m`](Self::unit_m), by columns.
+    /// Position first, then orientation; each in the axes of the tip, then in those of the base where there are such; metres and
+    /// radians per [`unit_m`](Self::unit_m), by columns.
     pub fn slopes(&self) -> &[f64] {
         &self.slopes
     }
@@ -178,7 +178,7 @@ impl PoseDependentError {
         &mut self.slopes
     }
 
-    /// Length of way per which the slopes count, metres.
+    /// Length to which the slopes refer, metres.
     pub fn unit_m(&self) -> f64 {
         self.places.unit_m
     }
@@ -188,7 +188,7 @@ impl PoseDependentError {
         self.places.mean
     }
 
-    /// How far from there the session went \[m\]; beyond it the field is what it is at that distance.
+    /// How far from there the session went \[m\]; beyond it the field is that at this distance.
     pub fn reach_m(&self) -> f64 {
         self.places.reach_m
     }
@@ -211,15 +211,15 @@ impl PoseDependentError {
         Slopes { position: part(0), orientation: part(1) }
     }
 
-    /// Where the tip is by a reported pose.
+    /// The true tip pose for a reported pose.
     pub fn applied(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Base, Tip> {
         let correction = correction_transform(&self.correction(base_from_tip));
         Pose::from_isometry(base_from_tip.isometry() * correction)
     }
 
     /// Error of a reported tip pose: translation \[m\] and rotation vector \[rad\] in the axes of the tip. The true pose is
-    /// `base_from_tip * (rho, exp(phi))`; with `p` the reported place, `R` the reported rotation and slopes `A`, `B` in the axes of the
-    /// tip and `A'`, `B'` in those of the base, `rho = (A + Rᵀ A') (p - origin)` and `phi = (B + Rᵀ B') (p - origin)`.
+    /// `base_from_tip * (rho, exp(phi))`; with `p` the reported place, `R` the reported rotation and slopes `A`, `B` in the axes of
+    /// the tip and `A'`, `B'` in those of the base, `rho = (A + Rᵀ A') (p - origin)` and `phi = (B + Rᵀ B') (p - origin)`.
     pub(crate) fn correction(&self, base_from_tip: &Pose<Base, Tip>) -> Vector6<f64> {
         let by_slopes = self.columns(base_from_tip, &Matrix6::identity());
         let correction = by_slopes * DVectorView::from_slice(&self.slopes, self.slopes.len());

@@ -12,7 +12,7 @@ use crate::handeye::motion::MIN_VIEWS;
 use handeye_geometry::point_error;
 use handeye_geometry::progress::{CancelToken, Stage, Work};
 
-/// Points of a curve at the most: enough for any chart, and a thousand views cost no more than a few hundred.
+/// Most points of a curve: enough for any chart, and a thousand views cost no more than a few hundred.
 const MOST_POINTS: usize = 100;
 
 /// One point of an [`ErrorCurve`].
@@ -20,18 +20,18 @@ const MOST_POINTS: usize = 100;
 pub struct ErrorPoint {
     /// Number of views.
     pub views: usize,
-    /// Expected error as in [`tip_error_95_m`](crate::uncertainty::quality::tip_error_95_m), metres; `None` where so few views leave a direction of the
-    /// answer free, or so weak that the error would exceed the distance of the board.
+    /// Expected error as in [`tip_error_95_m`](crate::uncertainty::quality::tip_error_95_m), metres; `None` where this few views
+    /// leave a direction of the answer free, or so weak that the error would exceed the distance of the board.
     pub tip_error_95_m: Option<f64>,
 }
 
 /// The expected error of a measured point by number of views.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorCurve {
-    /// With the first views alone, in their order, from three to all of them. Every number of views up to a hundred of
-    /// them; of more, a hundred evenly spaced, the last always among them.
+    /// Errors with the first views alone, in their order, from three to all of them. Every number of views up to a
+    /// hundred of them; of more, a hundred evenly spaced, the last always among them.
     pub gathered: Vec<ErrorPoint>,
-    /// Extrapolated to twice as many views, from the next on, spaced alike.
+    /// Extrapolated to twice as many views, from the next on, with the same spacing.
     pub further: Vec<ErrorPoint>,
 }
 
@@ -41,8 +41,8 @@ impl ErrorCurve {
         self.gathered.last().and_then(|p| Some((p.views, p.tip_error_95_m?)))
     }
 
-    /// How many views in all the goal takes when further ones tell as much as those gathered did on average; at least
-    /// as many as there are. `None` for a goal that is not positive, or when nothing is known yet.
+    /// How many views in all the goal takes when further ones have as much information as those gathered had on
+    /// average; at least as many as there are. `None` for a goal that is not positive, or when nothing is known yet.
     pub fn views_for(&self, goal_m: f64) -> Option<usize> {
         let (views, error_m) = self.now()?;
         if goal_m.is_nan() || goal_m <= 0.0 {
@@ -56,11 +56,11 @@ impl ErrorCurve {
 
 /// The expected error by number of views.
 ///
-/// View `i` tells `M_i = w Jsᵀ Js − w Jsᵀ Jd (w Jdᵀ Jd + P)⁻¹ w Jdᵀ Js` about the unknowns that all views share, with
-/// `w = corner_px⁻²`, the prior `P` of the pose correction and the Jacobians at the estimate. The first `k` views give the
-/// covariance `(M_1 + … + M_k)⁻¹`, and its hand-eye block the error at the reference point of the whole solution. Noise
-/// levels are those of the whole solution, taken as known. `k` views of further ones that tell as much as the average
-/// of the `n` gathered have the information `(k / n) (M_1 + … + M_n)`, so the error falls with `√(n / k)`.
+/// The information of view `i` is `M_i = w Jsᵀ Js − w Jsᵀ Jd (w Jdᵀ Jd + P)⁻¹ w Jdᵀ Js` on the unknowns that all views
+/// share, with `w = corner_px⁻²`, the prior `P` of the pose correction and the Jacobians at the estimate. The first `k`
+/// views give the covariance `(M_1 + … + M_k)⁻¹`, and its hand-eye block the error at the reference point of the whole
+/// solution. Noise levels are those of the whole solution, taken as known. `k` further views with as much information as
+/// the average of the `n` gathered have the information `(k / n) (M_1 + … + M_n)`, so the error falls with `√(n / k)`.
 ///
 /// The cost is linear in the number of views.
 ///
@@ -96,12 +96,12 @@ pub(crate) fn error_by_views<'a>(
                 point_error::radius_95(&point_error::covariance(&hand_eye, &solution.reference_point))
             });
             // Repeated views are not quite singular, by the rounding and the corrections of their poses; an error beyond
-            // the distance of the board says as little, because no derivative holds so far.
+            // the distance of the board is as meaningless, because no derivative holds that far.
             let tip_error_95_m = error_m.filter(|e| *e <= solution.reference_point.coords.norm());
             gathered.push(ErrorPoint { views, tip_error_95_m });
         }
     }
-    // What estimated noise levels add to the whole they add to every part of it alike.
+    // Estimated noise levels widen every part by the same factor as the whole.
     let plain = gathered.last().and_then(|p: &ErrorPoint| p.tip_error_95_m).filter(|e| *e > 0.0);
     let of_point = point_error::covariance(&solution.hand_eye_covariance(), &solution.reference_point);
     let stated = solution.small_sample.radius_95(&of_point);
@@ -117,7 +117,7 @@ pub(crate) fn error_by_views<'a>(
     Ok(ErrorCurve { gathered, further })
 }
 
-/// The corners of the views linearised at a solution with the robot where it was stated to be.
+/// The corners of the views linearised at a solution with the robot at its reported poses.
 ///
 /// # Errors
 /// [`HandEyeError::Cancelled`]; [`HandEyeError::NoSolution`] when the solution is not one of the problem.
@@ -143,14 +143,14 @@ fn spaced(first: usize, last: usize) -> Vec<usize> {
 /// What a solution expects of corners, RMS of 2-D distances in pixels over the views it was fitted to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ExpectedResiduals {
-    /// By how much the robot's noise moves a corner.
+    /// Displacement of a corner by the robot's noise.
     pub robot_px: f64,
     /// Residual of a view like these that was not in the fit, predicted from its reported robot pose: robot noise,
     /// corner noise and the uncertainty of the calibration together.
     pub prediction_px: f64,
 }
 
-/// What the noise levels and the covariance of a solution make of the corners of its own views.
+/// The residuals that the noise levels and the covariance of a solution give for the corners of its own views.
 ///
 /// With the normal equations of a view at its reported pose, the expected sum of squared distances of a prediction is
 /// `tr(Jdᵀ Jd Σ_robot) + tr(Jsᵀ Js C) + 2 corners corner_px²`; the first term alone is the robot's. `C` is the covariance

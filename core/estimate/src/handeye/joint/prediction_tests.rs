@@ -19,7 +19,7 @@ fn with_all_views_the_curve_ends_at_the_stated_error() {
         let stated = quality::tip_error_95_m(&solution);
         let (views, error) = curve.now().expect("known");
         assert_eq!(views, 12);
-        // Another order of summation, and a bisection that ends at a millionth.
+        // The tolerance is for another order of summation, and a bisection that ends at a millionth.
         assert!((error / stated - 1.0).abs() < 1e-5, "{mode:?} {free}: {error} {stated}");
     }
 }
@@ -48,8 +48,8 @@ fn with_the_first_views_the_curve_says_what_a_solve_of_them_alone_says() {
 
 #[test]
 fn the_extrapolation_is_near_what_more_views_of_the_same_kind_give() {
-    // Half the views predict the error of all. A set is not the average of its first half: over ten sets the mean ratio
-    // scatters by a few percent, and a single one by 15 %.
+    // Half of the views predict the error with all. A set is not the average of its first half: over ten sets the mean
+    // ratio scatters by a few percent, and a single one by 15 %.
     let mut mean = 0.0;
     for seed in 0..10 {
         let t = trial(Mode::EyeInHand, 40, &REALISTIC, camera(), 400 + seed);

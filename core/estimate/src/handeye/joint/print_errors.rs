@@ -1,19 +1,19 @@
-//! Whether the data show that the points of the target are not where its drawing has them, and what that does to the answer.
+//! Whether the data show that the points of the target are displaced from the drawing, and the effect of that on the answer.
 //!
-//! A printer, a bitmap and a plotter put every point of a target a little off, by the same in all views. The errors within
-//! the plane are an effect as in [`super::effects`], with the covariance `s² K`. What is usual of prints is in `K`, in shares
-//! that the data tell:
+//! A printer, a bitmap and a plotter displace every point of a target a little, equally in all views. The errors within the
+//! plane are an effect as in [`super::effects`], with the covariance `s² K`. The usual errors of prints are in `K`, in shares
+//! that the data determine:
 //!
-//! - errors of each point by itself,
+//! - independent errors of each point,
 //! - errors that a column of points has along x and a row along y, as where lines are drawn on the pixels of a bitmap,
 //! - errors that are smooth over the target, as of paper that stretches or a feed that is uneven.
 //!
-//! A shift and a turn of all points together are the place of the target, and no error. `K` is scaled so that `s` is the RMS
+//! A shift and a turn of all points together are the place of the target, not errors. `K` is scaled so that `s` is the RMS
 //! per axis. All shares and levels that are likely are integrated over: the errors are the mean of their posterior, and its
-//! covariance is added to that of the answer. The size of the target is taken as stated but for what errors of that level do
-//! to it.
+//! covariance is added to that of the answer. The size of the target is taken as stated except for the effect of errors of
+//! that level on it.
 //!
-//! The errors are put into the target and the fit is made again until they stand still.
+//! The errors are put into the target and the fit is repeated until they converge.
 //!
 //! Source: `docs/maths/print_errors.md`.
 
@@ -33,43 +33,44 @@ use handeye_geometry::targets::bent::BoardPoints;
 /// thousand. Half of all healthy sessions gain nothing, the rest follows chi-square with one degree of freedom (Self & Liang
 /// 1987), and shares of three kinds are tried.
 const GAIN: f64 = 11.6;
-/// RMS per axis that is tried, metres: a ten-thousandth of a millimetre is none, and ten millimetres are another target.
+/// RMS per axis that is tried, metres: a ten-thousandth of a millimetre is negligible, and ten millimetres are another
+/// target.
 const LEVELS_M: Range<f64> = 1e-7..1e-2;
-/// Shares of columns and rows, and of smooth errors, that are tried; the rest are errors of each point by itself.
+/// Shares of columns and rows, and of smooth errors, that are tried; the rest are independent errors of each point.
 const SHARES: [f64; 3] = [0.0, 0.45, 0.9];
-/// Points of a target above which no errors are looked for: the equations of twice as many unknowns take a second then, and
-/// the errors of so many points average.
+/// Points of a target above which no errors are searched for: the equations of twice as many unknowns take a second then,
+/// and the errors of this many points average out.
 const MOST_POINTS: usize = 150;
-/// Way over which smooth errors change, in terms of the longer side of the target.
+/// Distance over which smooth errors change, in terms of the longer side of the target.
 const SMOOTH: f64 = 0.5;
 /// Weight in terms of the largest below which a level does not count.
 const NO_WEIGHT: f64 = 1e-4;
 /// Part of all weights below which shares do not count in further rounds.
 const UNLIKELY: f64 = 1e-2;
-/// Rounds of errors and fit at the most.
+/// Most rounds of errors and fit.
 const MAX_ROUNDS: usize = 8;
-/// Square of the way of the errors in a round, in standard deviations of what the views say of them, below which they stand
-/// still.
+/// Squared change of the errors in a round, in standard deviations of their estimate by the views, below which they have
+/// converged.
 const STILL: f64 = 1e-2;
-/// The same in the last round: what goes to and fro within its own uncertainty is counted by that.
+/// The same in the last round: an oscillation within the uncertainty is covered by it.
 const AT_LAST: f64 = 1.0;
 
 /// Errors of a print that the data show.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PrintErrors {
-    /// Of every point of the target along its x and y, metres: where it is less where it is drawn.
+    /// Error of every point of the target along its x and y, metres: its true place less the drawn one.
     pub errors_m: Vec<Vector2<f64>>,
     /// Standard deviation of each of them per axis, metres.
     pub sigma_m: Vec<f64>,
     /// Gain of twice the log-likelihood over a target as drawn.
     pub gain: f64,
-    /// Part of the residuals that is left once the numbers that the errors take up are off.
+    /// Part of the residuals that is left after subtracting the degrees of freedom of the errors.
     used_up: f64,
-    /// Those that are likely.
+    /// The shares that are likely.
     shares: Vec<Shares>,
 }
 
-/// Of the variance, what columns and rows share and what is smooth over the target.
+/// Parts of the variance: errors of columns and rows, and smooth errors over the target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Shares {
     lines: f64,
@@ -101,8 +102,8 @@ impl PrintErrors {
         drawn.displaced(&self.errors_m)
     }
 
-    /// What is known of the errors before any view, as an information matrix in the order of the points along x and then along y: their
-    /// most likely kinds, of the size that they were found to have. `board` has the errors.
+    /// What is known of the errors before any view, as an information matrix in the order of the points along x and then along y:
+    /// their most likely kinds, of the size that they were found to have. `board` has the errors.
     pub(crate) fn prior_information(&self, board: &BoardPoints) -> Option<DMatrix<f64>> {
         let kinds = self.kinds(board);
         let covariances = kinds.roots.iter().map(|(_, root)| root * root.transpose());
@@ -112,7 +113,7 @@ impl PrintErrors {
         covariance_of(&(mean * (self.rms_m().powi(2) + unknown)))
     }
 
-    /// Those that are likely, on a target that has the errors.
+    /// The likely kinds, on a target that has the errors.
     fn kinds(&self, board: &BoardPoints) -> Kinds {
         let back: Vec<Vector2<f64>> = self.errors_m.iter().map(|error| -error).collect();
         Kinds::of(board.displaced(&back).drawn(), &self.shares)
@@ -124,9 +125,9 @@ impl PrintErrors {
     }
 }
 
-/// The estimate from the views of a problem with the print errors that they show; `without` is that without them. The target of
-/// the problem is that of the drawing. `None` also when the noise levels are given, and when the lens is: one that was given
-/// wrongly would be taken for a print.
+/// The estimate from the views of a problem with the print errors that they show; `without` is the estimate without them. The
+/// target of the problem is as drawn. `None` also when the noise levels are given, and when the lens is: errors of a wrong lens
+/// would be taken for print errors.
 ///
 /// # Errors
 /// [`HandEyeError::Cancelled`].
@@ -153,7 +154,7 @@ pub fn with_shown_print(
     settled(problem, shown, solution, cancel)
 }
 
-/// Errors and an estimate with them in rounds until the errors stand still; `None` where they do not.
+/// Errors and an estimate with them, in rounds until the errors converge; `None` where they do not.
 ///
 /// # Errors
 /// [`HandEyeError::Cancelled`]; [`HandEyeError::NoSolution`] when the solution is not one of the problem.
@@ -266,7 +267,7 @@ impl Kinds {
         let roots = shares.iter().filter_map(|shares| {
             let rest = 1.0 - shares.lines - shares.smooth;
             let kernel = &lines * shares.lines + &smooth * shares.smooth + &single * rest;
-            // What is rigid has no error at all, which is no number to divide by.
+            // Rigid motions have no error at all, and zero cannot be divided by.
             let least = DMatrix::identity(2 * n, 2 * n) * NO_ERROR;
             Cholesky::new(kernel + least).map(|factor| (*shares, factor.l()))
         });
@@ -274,7 +275,7 @@ impl Kinds {
     }
 }
 
-/// Variance in terms of that of an error that counts as none.
+/// Relative variance of an error that counts as zero.
 const NO_ERROR: f64 = 1e-6;
 
 /// Shifts of all points along x and along y and their turn, as orthonormal columns.
@@ -304,13 +305,13 @@ fn without(rigid: &DMatrix<f64>, kernel: DMatrix<f64>) -> DMatrix<f64> {
     if mean > 0.0 { whole / mean } else { kernel }
 }
 
-/// What the views say of the errors, over all kinds and levels.
+/// Posterior of the errors by the views, over all kinds and levels.
 struct Posterior {
     mean: DVector<f64>,
     covariance: DMatrix<f64>,
-    /// Of the most likely kind and level.
+    /// Gain of the most likely kind and level.
     gain: f64,
-    /// Trace of what the errors take up.
+    /// Degrees of freedom that the errors use up.
     freedom: f64,
     likely: Vec<Shares>,
 }
@@ -329,7 +330,7 @@ impl Posterior {
             .map(|(_, spectrum)| levels(&LEVELS_M).map(|level| (level, spectrum.gain(level))).collect())
             .collect();
         let gain = gains.iter().flatten().map(|(_, of)| *of).max_by(f64::total_cmp).unwrap_or(0.0);
-        // Every level and every kind is as likely as another beforehand.
+        // Every level and every kind has the same prior probability.
         let weight = |of: f64| (0.5 * (of - gain)).exp();
         let sum: f64 = gains.iter().flatten().map(|(_, of)| weight(*of)).filter(|weight| *weight > NO_WEIGHT).sum();
         let n = equations.pull.len();
@@ -367,7 +368,7 @@ impl Posterior {
         (0..n).map(|i| (0.5 * (self.covariance[(i, i)] + self.covariance[(n + i, n + i)])).max(0.0).sqrt()).collect()
     }
 
-    /// `None` where the errors take up all residuals.
+    /// `None` where the errors use up all residuals.
     fn shown(&self, gain: f64, residuals: f64) -> Option<PrintErrors> {
         let n = self.mean.len() / 2;
         let used_up = 1.0 - self.freedom / residuals;

@@ -13,16 +13,16 @@ use handeye_simulate::session::{REALISTIC, Session, camera, trial};
 /// Corners that are good and a robot that is nearly exact: what is left is the print.
 const EXACT_ROBOT: Noise = Noise { corner_px: 0.05, robot_m: 1e-6, robot_rad: 1e-6, ..Noise::EXACT };
 
-/// How a print is off.
+/// The errors of a print.
 #[derive(Debug, Clone, Copy)]
 enum Print {
     /// As drawn.
     Exact,
-    /// Every point by itself, RMS per axis, metres.
+    /// Every point independently, RMS per axis, metres.
     Single(f64),
     /// Lines on the pixels of a bitmap of that size, metres.
     Bitmap(f64),
-    /// Three waves over the target along each axis, each of an amplitude of so many metres.
+    /// Three waves over the target along each axis, each with this amplitude, metres.
     Waves(f64),
 }
 
@@ -80,7 +80,7 @@ fn squared_distance(session: &Session, solution: &JointSolution) -> f64 {
     error.dot(&(solution.hand_eye_covariance().try_inverse().expect("regular") * error))
 }
 
-/// Ways of the errors that are no error of the print.
+/// The errors without rigid motions, which are not errors of the print.
 fn without_rigid(errors: &[Vector2<f64>]) -> DVector<f64> {
     let n = errors.len();
     let all = DVector::from_fn(2 * n, |i, _| errors[i % n][i / n]);
@@ -113,7 +113,7 @@ fn errors_of_a_print_are_found_and_what_they_do_to_the_answer_is_counted() {
             noise.robot_m * 1e3
         );
         assert_eq!(found, trials);
-        // Of a true covariance it is 6 or less; 20 of them scatter by sqrt(12 / 20) = 0.8.
+        // With a true covariance it is 6 or less; 20 of them scatter by sqrt(12 / 20) = 0.8.
         assert!(with < 8.5, "{print:?}: {with}");
         assert!(plain > 1.3 * with, "{print:?}: {plain} without, {with} with");
         assert!(left < 0.5, "{print:?}: {left}");

@@ -1,4 +1,4 @@
-//! What the joint estimate is given.
+//! Input of the joint estimate.
 
 use nalgebra::DMatrix;
 
@@ -14,7 +14,7 @@ use handeye_geometry::targets::bent::{BoardPoints, BoardShape};
 use handeye_geometry::targets::observation::View;
 use handeye_geometry::view_equations::{FreeParameters, MeasuredDepths, ViewInput, Whitener};
 
-/// What is estimated besides the two rigid links.
+/// What is estimated in addition to the two rigid links.
 #[expect(clippy::struct_excessive_bools, reason = "each is a choice of its own")]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Free {
@@ -22,11 +22,11 @@ pub struct Free {
     pub intrinsics: bool,
     /// The two warps of the target, see [`BoardShape`].
     pub warp: bool,
-    /// The true size of the target over the stated one. It is seen through the robot's translations alone.
+    /// The true size of the target over the stated one. It is determined only by the robot's translations.
     pub scale: bool,
-    /// Errors of the robot's arm, where all views know its joints, see [`ArmErrors`].
+    /// Errors of the robot's arm, where all views have joint values, see [`ArmErrors`].
     pub arm: bool,
-    /// Errors of the robot that depend on where it stands, see [`PoseDependentError`].
+    /// Pose-dependent errors of the robot, see [`PoseDependentError`].
     pub field: bool,
     /// Errors of the depths of the views, see [`DepthBias`](handeye_geometry::view_equations::DepthBias).
     pub depth: bool,
@@ -43,17 +43,17 @@ impl Free {
 pub struct LensPrior<'a> {
     /// The lens that is expected.
     pub expected: Intrinsics,
-    /// Inverse of their covariance, in the order of [`Intrinsics::parameters`] and of their size; a direction of which
-    /// nothing is known has none.
+    /// Inverse of their covariance, in the order of [`Intrinsics::parameters`], one row each; zero in a direction of
+    /// which nothing is known.
     pub information: &'a DMatrix<f64>,
 }
 
-/// How depths count against corners, and what is known of their tilt.
+/// Weight of depths against corners, and what is known of their tilt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DepthWeight {
-    /// Pixels of a corner's error that a metre of the depths' counts as.
+    /// Pixels of corner error that count as much as a metre of depth error.
     pub px_per_m: f64,
-    /// Whether it is open how far they are turned against the lens; otherwise they are measured along it.
+    /// Whether their rotation against the lens is unknown; otherwise they are measured along it.
     pub turned: bool,
 }
 
@@ -68,25 +68,25 @@ impl DepthWeight {
 /// assumption about mountings of two sensors; its order is what matters. Where the tilt is known to a twentieth of it, depths count
 /// as turned from 3.5 of the tilt's standard deviations on, and with three times as much from 4.0.
 const TURNED_RAD: f64 = 0.3 * std::f64::consts::PI / 180.0;
-/// And of those that are: none.
+/// And of those that are measured along it: practically zero.
 const STRAIGHT_RAD: f64 = 1e-7;
 
 /// The data and what is known beforehand.
 #[derive(Debug, Clone, Copy)]
 pub struct JointProblem<'a> {
-    /// Where the camera sits.
+    /// Where the camera is mounted.
     pub mode: Mode,
     /// Points of the target as drawn.
     pub board: &'a BoardPoints,
     /// Views with corners; a view without corners is an error of the caller.
     pub views: &'a [View],
-    /// What is estimated besides the links.
+    /// What is estimated in addition to the links.
     pub free: Free,
     /// What is known of free intrinsics.
     pub lens_prior: Option<LensPrior<'a>>,
-    /// How corners are weighed against each other; `None` for all alike.
+    /// How corners are weighed against each other; `None` for equal weights.
     pub weights: Option<CornerWeights>,
-    /// How the depths of the views count; `None` where they do not.
+    /// Weight of the depths of the views; `None` where they do not count.
     pub depth: Option<DepthWeight>,
     /// Noise levels when they are known; otherwise they are estimated.
     pub noise: Option<Noise>,
@@ -95,7 +95,8 @@ pub struct JointProblem<'a> {
 }
 
 impl<'a> JointProblem<'a> {
-    /// Both links from these views, with known intrinsics and a flat target, all corners alike, noise levels estimated.
+    /// Both links from these views, with known intrinsics and a flat target, equal weights of all corners, noise levels
+    /// estimated.
     pub fn new(mode: Mode, board: &'a BoardPoints, views: &'a [View]) -> Self {
         Self {
             mode,
@@ -126,19 +127,20 @@ impl<'a> JointProblem<'a> {
         }
     }
 
-    /// How the corners of a view count.
+    /// Weights of the corners of a view.
     pub(super) fn whitener(&self, view: &View) -> Whitener {
         self.weights.map_or(Whitener::Alike, |weights| weights.whitener(&view.corners))
     }
 
-    /// The arm without errors, where they are free and all views know its joints; with a field where that is free, too.
+    /// The arm without errors, where they are free and all views have joint values; with a field where that is free,
+    /// too.
     pub(crate) fn arm(&self) -> Option<ArmErrors> {
         let joints = self.views.first()?.tip_from_joints.len();
         let all = joints > 1 && self.views.iter().all(|view| view.tip_from_joints.len() == joints);
         (self.free.arm && all).then(|| ArmErrors::none(joints).with_field(self.free_field(IN_BOTH)))
     }
 
-    /// The field without errors, where it is free and belongs to no arm.
+    /// The field without errors, where it is free and not part of an arm's errors.
     pub(super) fn field(&self) -> Option<PoseDependentError> {
         if self.arm().is_some() { None } else { self.free_field(IN_TIP) }
     }

@@ -1,15 +1,15 @@
-//! One lens for several sessions: what each says of it, and rounds until all state the same.
+//! One lens for several sessions: the information of each on it, and rounds until all agree.
 //!
 //! The sessions of one camera have nothing in common but the lens `ℓ`. With everything else of session `j` at its best the
 //! cost of that session is a function of the lens alone, `P_j(ℓ)`, and the joint optimum has the least sum of these. To
 //! second order about the lens `ℓ_j` of a fit, `P_j` has the gradient `2 g_j` and the curvature `2 I_j`, where `I_j` is what
 //! remains of the session's normal matrix when all but the lens is eliminated from it. So the other sessions are a Gaussian
-//! prior of the lens, and every session is estimated as it is by itself, with that prior ([`LensPrior`]).
+//! prior of the lens, and every session is estimated as if alone, with that prior ([`LensPrior`]).
 //!
-//! Where the rounds stand still all sessions have the same lens, and it is that of the joint optimum, exactly: session `i`
-//! ends where `g_i + Σ_{j≠i} [g_j + I_j (ℓ_i − ℓ_j)] = 0`. For all `i` that is the same linear equation, of which the matrix
-//! `Σ I_j` is regular; so all `ℓ_i` are equal, and `Σ g_j = 0` there. The covariance of a session with the prior is its
-//! block of the inverse of the joint normal matrix.
+//! Where the rounds have converged all sessions have the same lens, and it is that of the joint optimum, exactly: session
+//! `i` ends where `g_i + Σ_{j≠i} [g_j + I_j (ℓ_i − ℓ_j)] = 0`. For all `i` that is the same linear equation, of which the
+//! matrix `Σ I_j` is regular; so all `ℓ_i` are equal, and `Σ g_j = 0` there. The covariance of a session with the prior is
+//! its block of the inverse of the joint normal matrix.
 //!
 //! Source: Triggs et al. 2000, "Bundle adjustment — a modern synthesis", §6 (Schur complement and reduced systems);
 //! `docs/maths/shared_intrinsics.md`.
@@ -26,25 +26,25 @@ use handeye_geometry::progress::CancelToken;
 
 /// Name of the method in errors.
 const METHOD: &str = "the shared lens";
-/// Rounds at the most; a handful is usual.
+/// Most rounds; a handful is usual.
 const MAX_ROUNDS: usize = 30;
-/// Way of the lens of all sessions in a round, in its standard deviations, below which it stands still: noise levels settle
-/// to a thousandth, too.
+/// Change of the lens of all sessions in a round, in its standard deviations, below which it has converged: noise levels
+/// converge to a thousandth, too.
 const TOLERANCE: f64 = 1e-3;
 
-/// What the fit of one session says of its lens: its least cost as a function of the lens, to second order.
+/// The information of the fit of one session on its lens: its least cost as a function of the lens, to second order.
 #[derive(Debug, Clone)]
 pub struct LensInformation {
     /// The lens of the fit.
     at: Intrinsics,
     /// Half the gradient of the cost by [`Intrinsics::parameters`] there.
     gradient: DVector<f64>,
-    /// Half the second derivative.
+    /// Half the second derivative of the cost.
     information: DMatrix<f64>,
 }
 
 impl LensInformation {
-    /// Of a solution of `problem`, without what the prior of its lens adds.
+    /// The information of a solution of `problem`, without that of the prior of its lens.
     ///
     /// # Errors
     /// [`HandEyeError::NoSolution`] when the lens is not estimated or not determined, [`HandEyeError::Cancelled`].
@@ -59,7 +59,7 @@ impl LensInformation {
         }
         let state = State::of(solution);
         let reduced = |problem: &JointProblem<'_>| System::new(problem, &state, cancel)?.reduce(&solution.noise);
-        // Taken off what is known with it, a strong prior leaves rounding where the session alone says little.
+        // Subtracting a strong prior would leave only rounding where the session alone has little information.
         let (reduced, prior) = match reduced(&JointProblem { lens_prior: None, ..*problem }) {
             Ok(by_itself) => (by_itself, None),
             Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
@@ -77,14 +77,14 @@ impl LensInformation {
         Ok(Self { at: solution.intrinsics, gradient, information })
     }
 
-    /// Of a solution by itself, as its covariance states it; `None` when the lens is not determined.
+    /// The information of a single solution, by its covariance; `None` when the lens is not determined.
     pub fn stated(solution: &JointSolution) -> Option<Self> {
         let (at, count) = (Layout::FORM_AT, solution.intrinsics.parameter_count());
         let information = covariance_of(&solution.covariance.view((at, at), (count, count)).into_owned())?;
         Some(Self { at: solution.intrinsics, gradient: DVector::zeros(count), information })
     }
 
-    /// The same from a session in which something else makes the lens less known: where it is known to `I⁻¹`, by
+    /// The same from a session in which something else makes the lens more uncertain: its covariance `I⁻¹` grows by
     /// `I⁻¹ G I⁻¹`. `None` where the lens is not determined.
     #[must_use]
     pub fn less(self, unknown: &DMatrix<f64>) -> Option<Self> {
@@ -95,7 +95,7 @@ impl LensInformation {
         Some(Self { gradient, information, ..self })
     }
 
-    /// The same from a session whose variances are all so many times as large.
+    /// The same from a session whose variances are all this many times as large.
     #[must_use]
     pub fn widened(mut self, factor: f64) -> Self {
         self.gradient /= factor;
@@ -114,8 +114,8 @@ pub struct LensEstimate {
 }
 
 impl LensEstimate {
-    /// By what several sessions say together: the lens with the least sum of their costs, to second order. `None` when they
-    /// leave it undetermined, as none do.
+    /// The lens by the information of several sessions together: the one with the least sum of their costs, to second
+    /// order. `None` when they leave it undetermined, as no sessions do.
     pub fn by<'a>(all: impl IntoIterator<Item = &'a LensInformation>) -> Option<Self> {
         let mut all = all.into_iter();
         let LensInformation { at, mut gradient, mut information } = all.next()?.clone();
@@ -128,13 +128,13 @@ impl LensEstimate {
         Some(Self { intrinsics: at.with_parameters(&parameters), information })
     }
 
-    /// As a prior for another session.
+    /// This estimate as a prior for another session.
     pub fn as_prior(&self) -> LensPrior<'_> {
         LensPrior { expected: self.intrinsics, information: &self.information }
     }
 
-    /// The same for a session that is to count for as much less itself: its costs over `factor` with the prior, or its
-    /// costs with the prior times `factor`, have the same optimum.
+    /// The same for a session that itself is to count for less by that factor: its costs over `factor` with the prior,
+    /// or its costs with the prior times `factor`, have the same optimum.
     #[must_use]
     pub fn times(mut self, factor: f64) -> Self {
         self.information *= factor;
@@ -159,7 +159,7 @@ pub fn difference(a: &Intrinsics, b: &Intrinsics) -> DVector<f64> {
     DVector::from_iterator(a.len(), a.iter().zip(&b).map(|(a, b)| a - b))
 }
 
-/// A fit of one session and what it says of its lens.
+/// A fit of one session and its information on the lens.
 #[derive(Debug, Clone)]
 pub struct Fitted<S> {
     pub fit: S,
@@ -171,9 +171,9 @@ pub fn by_others<S>(sessions: &[Fitted<S>], one: usize) -> Option<LensEstimate> 
     LensEstimate::by(sessions.iter().enumerate().filter(|(j, _)| *j != one).map(|(_, other)| &other.says))
 }
 
-/// Rounds from fits of two or more sessions, each by itself, until the lens that they state together stands still; it is
-/// returned with the last fits. `None` when the lens is undetermined or does not settle. `refit` makes a new fit of a session in a round (from 0) from its
-/// last one, with what the others say of the lens; it may decide again what belongs to the model in the first `deciding`
+/// Rounds from fits of two or more sessions, each alone, until their joint lens converges; it is returned with the last fits.
+/// `None` when the lens is undetermined or does not converge. `refit` makes a new fit of a session in a round (from 0) from its
+/// last one, with the information of the others on the lens; it may decide again what belongs to the model in the first `deciding`
 /// rounds.
 ///
 /// # Errors

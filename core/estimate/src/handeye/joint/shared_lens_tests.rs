@@ -161,13 +161,13 @@ fn what_a_session_says_of_its_lens_is_without_what_the_prior_adds() {
     let (session, noise) = &sessions[0];
     let alone = fitted(&sessions[0], None, None).expect("solves");
     let other = LensEstimate::by([&fitted(&sessions[1], None, None).expect("solves").says]).expect("determined");
-    // So strong that taking it off again would leave nothing but rounding.
+    // So strong that subtracting it again would leave nothing but rounding.
     let strong = other.clone().times(1e9);
     let problem = JointProblem { lens_prior: Some(strong.as_prior()), ..session.problem(true, Some(*noise)) };
     let says = LensInformation::of(&problem, &alone.fit, &CancelToken::default()).expect("determined");
     let with = LensEstimate::by([&says]).expect("determined");
     let without = LensEstimate::by([&alone.says]).expect("determined");
-    // The same to what inverting a matrix twice leaves: scaled, its condition is below 1e8 of 1e16.
+    // The same within the rounding of inverting a matrix twice: scaled, its condition is below 1e8 of 1e16.
     assert!(without.distance(&with.intrinsics) < 1e-5, "{}", without.distance(&with.intrinsics));
     let ratio = with.information.diagonal().component_div(&without.information.diagonal());
     assert!(ratio.iter().all(|r| (r - 1.0).abs() < 1e-6), "{ratio}");

@@ -1,4 +1,4 @@
-//! Effects on all corners that the data showed and a fit counts on, see [`super::effects`].
+//! Effects on all corners that the data showed and a fit includes, see [`super::effects`].
 
 use nalgebra::DMatrix;
 
@@ -14,15 +14,15 @@ use handeye_geometry::targets::bent::BoardPoints;
 /// Effects that are in a model.
 #[derive(Clone, Copy, Default)]
 pub struct ShownEffects<'a> {
-    /// What the points of the target are off their drawing.
+    /// Displacements of the points of the target from their drawing.
     pub print: Option<&'a PrintErrors>,
-    /// What the lens does beyond its model.
+    /// Residual distortion of the lens beyond its model.
     pub distortion: Option<&'a ShownDistortion>,
 }
 
 impl ShownEffects<'_> {
-    /// They, and what is known of their coefficients beforehand as an information matrix; `None` where that is singular. `board` has
-    /// the errors of the print.
+    /// These effects, and the prior of their coefficients as an information matrix; `None` where that is singular. `board` has the
+    /// errors of the print.
     pub(crate) fn beforehand(self, board: &BoardPoints) -> Option<(Vec<Effect>, DMatrix<f64>)> {
         let (mut effects, mut parts) = (Vec::new(), Vec::new());
         if let Some(print) = self.print {

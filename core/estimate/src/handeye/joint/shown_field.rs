@@ -1,4 +1,4 @@
-//! Whether the data show errors of the robot that depend on where it stands.
+//! Whether the data show pose-dependent errors of the robot.
 
 use super::normal::System;
 use super::pose_dependent_error::Places;
@@ -10,20 +10,20 @@ use handeye_geometry::progress::{CancelToken, Work};
 use handeye_geometry::targets::observation::View;
 
 /// Gain of minus twice the log-likelihood from which the robot's field is taken into the model: by chance one session in a
-/// hundred. Both its levels are at the edge of what they can be, so a quarter of all healthy sessions gains nothing, one
-/// half follows chi-square with one degree of freedom and the last quarter with two (Self & Liang 1987).
+/// hundred. Both its levels are at the edge of their range, so a quarter of all healthy sessions gains nothing, one half
+/// follows chi-square with one degree of freedom and the last quarter with two (Self & Liang 1987).
 const GAIN: f64 = 7.29;
-/// Part of the gain that the linearised equations have to show for a fit with the field: these differ from it in the second
-/// order. Of 1,026 simulated sessions whose fit showed a field (10 to 30 views, both set-ups, fields of half to five times the
+/// Part of the gain that the linearised equations have to show for a fit with the field: these differ from it in second order.
+/// Of 1,026 simulated sessions whose fit showed a field (10 to 30 views, both set-ups, fields of half to five times the
 /// robot's noise) none was missed.
 const NEARLY: f64 = 0.8;
 /// Standard deviation of the size of a target over the stated one, before any data: printers scale to fit, and rulers are
 /// read to half a millimetre on a square of some twenty.
 pub(crate) const SIZE_SIGMA: f64 = 0.03;
 
-/// The estimate from `views` with a [`PoseDependentError`](super::PoseDependentError), when they show one; `without` is their estimate
-/// without it, with the errors of the arm where these are free: then the field is what they do not explain. `None` also when the noise
-/// levels are given, and with fewer than ten views.
+/// The estimate from `views` with a [`PoseDependentError`](super::PoseDependentError), when they show one; `without` is their
+/// estimate without it, with the errors of the arm where these are free: then the field is what they do not explain. `None` also
+/// when the noise levels are given, and with fewer than ten views.
 ///
 /// A target of another size than stated looks like a field that grows with the distance. So the field has to be likelier
 /// than another size of the target, too.
@@ -75,10 +75,10 @@ fn gains(with: &JointProblem<'_>, without: &JointSolution, cancel: &CancelToken)
     Ok(determined(found)?.is_some_and(|(_, field)| plain - field >= NEARLY * GAIN))
 }
 
-/// Minus twice the log-likelihood of an estimate whose target may be of another size, to compare with one whose may not:
-/// the size is integrated over what is known of it beforehand, as the slopes of the field are.
+/// Minus twice the log-likelihood of an estimate whose target may be of another size, to compare with one whose size is
+/// as stated: the size is integrated over its prior, as the slopes of the field are.
 fn by_size(sized: &JointSolution) -> Option<f64> {
-    // Beside an arm its quadratic part is among the equations already.
+    // Together with an arm its quadratic part is among the equations already.
     let prior = if sized.free.arm { 0.0 } else { ((sized.shape.scale - 1.0) / SIZE_SIGMA).powi(2) };
     Some(sized.deviance? + 2.0 * SIZE_SIGMA.ln() + prior)
 }

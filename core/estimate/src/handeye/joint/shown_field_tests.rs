@@ -35,7 +35,7 @@ fn a_robot_whose_errors_depend_on_the_place_is_calibrated_better_with_its_field_
             "{mode:?}: shown in {shown} of {trials}, mean squared Mahalanobis distance {mean:.2} of 6, error {gain:.1} times smaller"
         );
         assert_eq!(shown, trials, "{mode:?}");
-        // Of a true covariance it is 6, and the mean of 30 scatters by sqrt(12 / 30) = 0.63.
+        // With a true covariance it is 6, and the mean of 30 scatters by sqrt(12 / 30) = 0.63.
         assert!((4.1..9.0).contains(&mean), "{mode:?}: {mean}");
         assert!(gain > 3.0, "{mode:?}: {gain}");
     }

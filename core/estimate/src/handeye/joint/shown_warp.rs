@@ -10,10 +10,10 @@ use super::{JointProblem, JointSolution};
 use crate::handeye::{HandEyeError, determined};
 use handeye_geometry::progress::CancelToken;
 
-/// `wᵀ C⁻¹ w / 2` of the two warps of the target, one step from a solution, with noise levels found again in the equations that
-/// are linearised there. From the fit of a flat target that is what a fit of the warps would say but for terms of the second
-/// order. `None` where these equations determine none, as for a target that is seen square on. `with` is the problem of the fit,
-/// the warps free.
+/// `wᵀ C⁻¹ w / 2` of the two warps of the target, one step from a solution, with noise levels estimated again in the equations
+/// linearised there. From the fit of a flat target that equals the ratio of a fit of the warps except for terms of second order.
+/// `None` where these equations do not determine the warps, as for a target that is seen square on. `with` is the problem of the
+/// fit, the warps free.
 ///
 /// # Errors
 /// [`HandEyeError::Cancelled`].

@@ -6,7 +6,7 @@ use crate::test_sessions::Estimated as _;
 use handeye_geometry::targets::bent::BoardShape;
 use handeye_simulate::session::{REALISTIC, camera, trial};
 
-/// The ratio one step from a flat fit, and whether a fit of the warps shows a bend, of a target that is bent so.
+/// The ratio one step from a flat fit, and whether a fit of the warps shows a bend, of a target with this bend.
 fn of_session(views: usize, free_lens: bool, warp_m: [f64; 2], seed: u64) -> (Option<f64>, bool) {
     let mut t = trial(Mode::EyeInHand, views, &REALISTIC, camera(), seed);
     let shape = BoardShape { warp_m, scale: 1.0 };
@@ -36,7 +36,7 @@ fn a_bend_that_a_fit_shows_is_not_passed_over_and_flat_targets_are_spared_the_fi
     let (mut shown, mut spared) = (0, 0);
     for (views, free_lens) in [(6, false), (10, true), (20, false)] {
         for seed in 0..8 {
-            // From what hardly any session shows to what all do.
+            // From a bend that hardly any session shows to one that all do.
             for bend_m in [2e-5, 4e-5, 6e-5, 1e-4, 1e-3] {
                 let (ratio, by_fit) = of_session(views, free_lens, [bend_m, -0.5 * bend_m], 5200 + seed);
                 shown += usize::from(by_fit);
@@ -48,6 +48,6 @@ fn a_bend_that_a_fit_shows_is_not_passed_over_and_flat_targets_are_spared_the_fi
     }
     println!("shown in {shown} of 120, spared {spared} of 24 flat ones");
     assert!((24..=108).contains(&shown), "{shown}: the bends are not about the limit");
-    // Four in a thousand are not, by chance.
+    // Four in a thousand are not spared, by chance.
     assert!(spared >= 23, "{spared} of 24");
 }

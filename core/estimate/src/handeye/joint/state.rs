@@ -21,13 +21,13 @@ pub struct State {
     pub anchor_from_target: Pose<Anchor, Target>,
     pub intrinsics: Intrinsics,
     pub shape: BoardShape,
-    /// None where it is not free.
+    /// Zero where it is not free.
     pub depth: DepthBias,
-    /// `None` when they are not free, and where a view does not know its joints.
+    /// `None` when they are not free, and where a view has no joint values.
     pub arm: Option<ArmErrors>,
     /// `None` when it is not free, and where it belongs to the errors of the arm.
     pub field: Option<PoseDependentError>,
-    /// Of every view, beyond that of the field.
+    /// Correction of every view, beyond that of the field.
     pub corrections: Vec<Vector6<f64>>,
 }
 
@@ -73,7 +73,7 @@ impl State {
         of_field.copied().chain(self.arm.iter().flat_map(ArmErrors::numbers)).collect()
     }
 
-    /// Whether there are errors that depend on where the robot stands, by themselves or beside those of its links.
+    /// Whether there are pose-dependent errors of the robot, alone or in addition to those of its links.
     pub fn has_field(&self) -> bool {
         self.slope_count() > 0
     }
@@ -83,7 +83,7 @@ impl State {
         self.field.as_ref().map_or(of_arm, |field| field.slopes().len())
     }
 
-    /// The same field, affine as far as these views go, too.
+    /// The same field, affine out to these views, too.
     pub fn reaching(mut self, views: &[View]) -> Self {
         let reaching = |field: PoseDependentError| field.reaching(views.iter().map(|view| &view.base_from_tip));
         self.field = self.field.map(reaching);

@@ -43,8 +43,9 @@ fn error_reaches_the_bound_and_the_stated_covariance_is_true() {
 
 #[test]
 fn noise_levels_are_recovered_where_the_data_can_tell_them() {
-    // Half a millimetre and a tenth of a degree stand clear of what 0.1 px of corner noise does to a pose. Spread of a
-    // standard deviation from 120 numbers, averaged over 20 trials: 1.4 %; three of those, and the loss to the unknowns.
+    // Half a millimetre and a tenth of a degree are well above the effect of 0.1 px of corner noise on a pose. Spread of
+    // a standard deviation from 120 numbers, averaged over 20 trials: 1.4 %; three of those, and the loss to the
+    // unknowns.
     let noise = Noise { corner_px: 0.1, robot_m: 5e-4, robot_rad: 0.1f64.to_radians(), ..Noise::EXACT };
     let trials = 20;
     let mut mean = Vector3::zeros();
@@ -89,7 +90,7 @@ fn an_exact_robot_is_recognised() {
     assert!(solution.noise.robot_m < 3e-5, "{:?}", solution.noise);
 }
 
-/// A robot taken for exact makes every view as good as its corners: the stated error is then too small.
+/// A robot taken as exact gives every view the accuracy of its corners: the stated error is then too small.
 #[test]
 fn a_level_that_vanished_on_the_way_is_found_again() {
     let t = trial(Mode::EyeInHand, 12, &REALISTIC, camera(), 3);
@@ -113,7 +114,7 @@ fn the_answer_does_not_depend_on_the_order_of_views() {
     let solve = |t: &Session| estimate(&t.problem(true, None), &t.start(), &CancelToken::default()).expect("solves");
     let (a, b) = (solve(&t), solve(&reversed));
     let (metres, radians) = a.hand_eye.mount_from_camera().distance_to(&b.hand_eye.mount_from_camera());
-    // Noise levels are settled to a thousandth; what that leaves is far below a micrometre.
+    // Noise levels converge to a thousandth; the difference from that is far below a micrometre.
     assert!(metres < 1e-6 && radians < 1e-6, "{metres} {radians}");
 }
 
@@ -135,7 +136,7 @@ fn influence_is_what_leaving_the_view_out_does() {
 
 #[test]
 fn noise_that_views_share_is_none_or_one_that_counts() {
-    // What rounding leaves of none would be a level more to integrate out.
+    // A level of zero that rounding left positive would be one more to integrate out.
     for seed in 0..12 {
         let t = trial(Mode::EyeToHand, 8, &REALISTIC, camera(), seed);
         let noise = fit(&t.problem(false, None), &t.start(), &CancelToken::default()).expect("solves").noise;

@@ -1,10 +1,11 @@
 //! Noise levels from the data: restricted maximum likelihood of the linearised model.
 //!
 //! With all unknowns integrated out, minus twice the log-likelihood of the noise levels is
-//! `(n − 6 N) ln corner² + 6 N ln (corner² + view²) + 3 N ln robot_m² + 3 N ln robot_rad² + ln det H + Q` (and of the effects in the model,
-//! slopes of the robot's field and errors of its arm, their number times the log of the variance of their kind) for `n` residuals of `N` views, where `H` is the normal matrix and `Q` the least weighted cost. Its derivative by the log of each variance is
-//! the familiar `count - expected sum of squares`, the fixed point of the EM iteration; Newton on the logs gets there in a
-//! few steps where EM crawls when the robot is nearly exact.
+//! `(n − 6 N) ln corner² + 6 N ln (corner² + view²) + 3 N ln robot_m² + 3 N ln robot_rad² + ln det H + Q` (and of the effects in
+//! the model, slopes of the robot's field and errors of its arm, their number times the log of the variance of their kind) for `n`
+//! residuals of `N` views, where `H` is the normal matrix and `Q` the least weighted cost. Its derivative by the log of each
+//! variance is the familiar `count - expected sum of squares`, the fixed point of the EM iteration; Newton on the logs gets there
+//! in a few steps where EM crawls when the robot is nearly exact.
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector6};
 
@@ -28,7 +29,7 @@ const LOWEST: Noise = Noise {
     link_m: 1e-9,
     compliance_rad: 1e-9,
 };
-/// Highest levels: beyond them the robot pose says nothing.
+/// Highest levels: beyond them the robot pose has no information.
 const HIGHEST: Noise = Noise {
     corner_px: 1e4,
     view_px: 1e4,
@@ -40,23 +41,23 @@ const HIGHEST: Noise = Noise {
     link_m: 1.0,
     compliance_rad: 1.0,
 };
-/// Effects of less than this part of the robot's noise are none, and how much less does not matter.
+/// Effects below this part of the robot's noise count as zero, and how far below does not matter.
 const NO_EFFECT: f64 = 1e-3;
 /// Newton steps.
 const MAX_STEPS: usize = 60;
 /// Largest change of a log-variance in one step.
 const LARGEST_STEP: f64 = 3.0;
-/// Gain of the likelihood below which the levels of an answer stand still: a unit of `-2 ln L` is one standard deviation, so
-/// they are off by a thousandth of one.
+/// Gain of the likelihood below which the levels of an answer have converged: a unit of `-2 ln L` is one standard deviation,
+/// so they are off by a thousandth of one.
 pub const EXACTLY: f64 = 1e-6;
-/// And those that something is decided by, which asks for gains of some units: they are off by a tenth of a standard
-/// deviation.
+/// And levels that are only used for a decision, which requires gains of some units: they are off by a tenth of a
+/// standard deviation.
 pub const ROUGHLY: f64 = 1e-2;
 
 /// Which levels are estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Levels {
-    /// What the corners of a view have in common.
+    /// The noise that the corners of a view share.
     pub view: bool,
     /// The robot's field.
     pub field: bool,
@@ -105,8 +106,8 @@ const ARM_AT: usize = EFFECTS_AT + 2;
 pub const LEVELS: usize = EFFECTS_AT + EFFECTS;
 
 /// Logs of the variances of a corner, of the robot's position and orientation, of the part of a view that looks like a
-/// pose, and of the kinds of effects. The fourth follows the first where it is not estimated, and those of effects mean nothing
-/// then.
+/// pose, and of the kinds of effects. The fourth follows the first where it is not estimated, and those of effects are
+/// meaningless then.
 pub type Logs = SVector<f64, LEVELS>;
 /// Rows and columns per level.
 pub type LevelMatrix = SMatrix<f64, LEVELS, LEVELS>;
@@ -135,7 +136,7 @@ pub fn starting_noise(problem: &JointProblem<'_>, state: &State) -> Noise {
     Noise { corner_px: misfit_px.clamp(1e-3, 0.3), robot_m: 1e-3, robot_rad: 2e-3, ..Noise::EXACT }
 }
 
-/// Largest relative change of any level, ignoring what happens at the floor.
+/// Largest relative change of any level, ignoring changes at the lower limit.
 pub fn change(a: &Noise, b: &Noise) -> f64 {
     let relative = |a: f64, b: f64, floor: f64| (b.max(10.0 * floor) / a.max(10.0 * floor)).ln().abs();
     relative(a.corner_px, b.corner_px, LOWEST.corner_px)
@@ -149,21 +150,21 @@ pub fn change(a: &Noise, b: &Noise) -> f64 {
         .max(relative(a.compliance_rad, b.compliance_rad, NO_EFFECT * LEVELS_OF_ARMS[2]))
 }
 
-/// Minus twice the restricted log-likelihood at some levels, and what goes with it.
+/// Minus twice the restricted log-likelihood at some levels, and related quantities.
 pub struct Likelihood {
     pub value: f64,
-    /// By the log-variances.
+    /// Derivatives by the log-variances.
     gradient: Logs,
-    /// How many residuals tell each level: all that it makes, less those that the unknowns use up and those that are lost in
-    /// the noise of the other levels. Those of the corners' rest and of the poses' part are apart, also where the two are one
-    /// level.
+    /// Number of residuals that determine each level: all that it affects, less those that the unknowns use up and those that
+    /// are lost in the noise of the other levels. Those of the corners' rest and of the poses' part are separate, also where
+    /// the two are one level.
     pub counts: Logs,
     /// Sums of `F_iᵀ F_i` over the views, see [`super::information`], for the corrections of position and of orientation.
     pub moments: [DMatrix<f64>; 2],
     pub reduced: Reduced,
-    /// Of the shared unknowns.
+    /// Covariance of the shared unknowns.
     pub covariance: DMatrix<f64>,
-    /// Of the shared unknowns, from the point of linearisation to the optimum at these levels.
+    /// Step of the shared unknowns from the point of linearisation to the optimum at these levels.
     pub step: DVector<f64>,
 }
 
@@ -176,7 +177,7 @@ fn to_noise(logs: &Logs, levels: Levels) -> Noise {
     };
     Noise {
         corner_px,
-        // Of a level that is not estimated rounding would leave a difference, which then counted as one.
+        // For a level that is not estimated rounding would leave a difference, which would then count as noise.
         view_px: if levels.view {
             (logs[3].exp() - corner_px.powi(2)).clamp(0.0, HIGHEST.view_px.powi(2)).sqrt()
         } else {
@@ -202,7 +203,7 @@ pub fn to_logs(noise: &Noise) -> Logs {
     Logs::from_iterator(all)
 }
 
-/// Keeps the logs in their range, and the pose's part no smaller than what independent corners make of it.
+/// Keeps the logs in their range, and the pose's part no smaller than with independent corners.
 pub fn kept(mut logs: Logs, levels: Levels) -> Logs {
     let (low, high) = (to_logs(&LOWEST), to_logs(&HIGHEST));
     for i in (0..LEVELS).filter(|i| *i != 3) {
@@ -253,7 +254,7 @@ pub fn evaluate(system: &System, logs: &Logs, levels: Levels) -> Result<Likeliho
         (squares.fixed_rows::<3>(at).sum(), traces.fixed_rows::<3>(at).sum() + through)
     });
     let unknowns = n as f64 + in_poses;
-    // tr(H H⁻¹) counts the unknowns; what the priors do not take of it is the corners' share.
+    // tr(H H⁻¹) counts the unknowns; the part not due to the priors is the corners' share.
     let known_cost = system.prior_cost(&noise, Some(&step));
     let known_trace = system.prior_trace(&noise, &covariance);
     let corner_squares = least_cost - squares.sum() - known_cost;
@@ -293,14 +294,15 @@ pub fn evaluate(system: &System, logs: &Logs, levels: Levels) -> Result<Likeliho
     Ok(Likelihood { value, gradient, counts, moments, reduced, covariance, step })
 }
 
-/// The most likely noise levels of a linearised system, and what goes with them.
+/// The most likely noise levels of a linearised system, and the likelihood at them.
 pub struct MostLikely {
     pub logs: Logs,
     pub at: Likelihood,
 }
 
 impl MostLikely {
-    /// About half the second derivatives of what was minimised, by the log-variances; zero for a level that is not estimated.
+    /// Approximately half the second derivatives of what was minimised, by the log-variances; zero for a level that is not
+    /// estimated.
     pub fn information(&self, system: &System, levels: Levels, aim: Aim) -> LevelMatrix {
         0.5 * slope(system, &self.logs, &self.at, levels, aim).1
     }
@@ -316,7 +318,7 @@ pub enum Aim {
 }
 
 /// Minus twice the log of the density of the log-variances of an arm's errors by [`LEVELS_OF_ARMS`], and its derivatives. It is
-/// part of the likelihood: what is known of arms is known of them in every fit.
+/// part of the likelihood: the prior knowledge of arms applies in every fit.
 fn prior_of_arms(logs: &Logs, levels: Levels) -> (f64, Logs) {
     let (mut value, mut gradient) = (0.0, Logs::zeros());
     if levels.arm {
@@ -330,13 +332,13 @@ fn prior_of_arms(logs: &Logs, levels: Levels) -> (f64, Logs) {
 }
 
 /// Minus twice the log of the prior density of the other log-variances: proportional to [`Likelihood::counts`]. It is flat where
-/// a level is seen well, as Jeffreys' prior of a variance is, so that a level which only a few numbers tell gives Student's
-/// distribution; and it falls with the variance itself below what the noise of the other levels lets be seen, so that a
-/// level of nothing takes the place that it has among the others and no more.
+/// a level is well determined, as Jeffreys' prior of a variance is, so that a level which only a few numbers determine gives
+/// Student's distribution; and it falls with the variance itself below what the noise of the other levels hides, so that a level
+/// of zero gets its share among the others and no more.
 ///
 /// # Reference
 /// Berger & Deely 1988, "A Bayesian approach to ranking and selection of related means", JASA 83, 364–373 (the prior for
-/// one level; it is Jeffreys' up to a constant where all views are alike).
+/// one level; it is Jeffreys' up to a constant where all views are equal).
 pub fn prior(at: &Likelihood, levels: Levels) -> f64 {
     let counts = levels.folded(at.counts);
     -2.0 * levels.estimated().filter(|k| *k < ARM_AT).map(|k| counts[k].max(f64::MIN_POSITIVE).ln()).sum::<f64>()
@@ -359,7 +361,7 @@ pub fn most_likely(
         let mut improved = false;
         while damping < 1e9 {
             let next_logs = kept(logs + newton_step(&curvature, &gradient, damping), levels);
-            // Levels that leave the answer undetermined are not the ones that are looked for.
+            // Levels that leave the answer undetermined are not the ones that are searched for.
             let next = determined(evaluate(system, &next_logs, levels))?;
             let gain = next.as_ref().map_or(f64::NEG_INFINITY, |next| aimed(&at) - aimed(next));
             if let (Some(next), true) = (next, gain > 0.0) {
@@ -377,10 +379,10 @@ pub fn most_likely(
     Ok(MostLikely { logs, at })
 }
 
-/// Levels to search from, with those that are nothing lifted to where the noise of the others begins to hide them. In its log
-/// a level far below makes no difference, so that a search that begins there stays there.
+/// Levels to search from, with those at zero lifted to where the noise of the others begins to hide them. Far below that the
+/// log of a level makes no difference, so that a search that begins there stays there.
 pub fn lifted(system: &System, noise: &Noise, levels: Levels) -> Result<Logs, HandEyeError> {
-    /// Part of all numbers of a level that is seen where it starts.
+    /// Part of all numbers of a level that determine it at its start.
     const SEEN: f64 = 0.2;
     let mut logs = kept(to_logs(noise), levels);
     let counts = evaluate(system, &logs, levels)?.counts;

@@ -6,10 +6,11 @@ use handeye_geometry::targets::corner_covariance::COMMON;
 use handeye_geometry::targets::observation::{Corner, Corners};
 use handeye_geometry::view_equations::Whitener;
 
-/// Corners weighed by what their detector states: a residual `r` counts as `W r`, so that all have the same noise level.
+/// Corners weighted by the covariances that their detector states: a residual `r` counts as `W r`, so that all have the
+/// same noise level.
 ///
-/// The ratios of the stated covariances are taken over, their level is not, because a detector knows nothing of what
-/// vibration, compression or a dirty board add. `WᵀW` is the inverse covariance times the mean variance per axis.
+/// The ratios of the stated covariances are used, their level is not, because a detector does not know what vibration,
+/// compression or a dirty board add. `WᵀW` is the inverse covariance times the mean variance per axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CornerWeights {
     mean_px2: f64,
@@ -27,7 +28,8 @@ impl CornerWeights {
         (mean_px2.is_finite() && mean_px2 > 0.0).then_some(Self { mean_px2 })
     }
 
-    /// Of the corners of an image. A corner whose covariance is none, or is not one, counts like the typical corner.
+    /// The whitener of the corners of an image. A corner without a covariance, or with an invalid one, counts like the
+    /// typical corner.
     pub fn whitener(self, corners: &Corners) -> Whitener {
         if let Some(covariance) = corners.covariance() {
             return Whitener::Together { covariance: covariance.clone(), unit_px2: self.mean_px2 };

@@ -3,14 +3,15 @@
 //! Every view with depths adds the three numbers of a plane to its corners ([`DepthPlane`]), and the errors of the depth camera are
 //! unknowns that all views share ([`DepthBias`]).
 //!
-//! Neighbouring depths have the same error, so a plane is known as if all its depths erred together, by one standard deviation that
-//! all views share. It is the one that makes the residuals most likely (REML): with `w` pixels of a corner's error to a metre, and
-//! `D(w)` minus twice the log of the restricted likelihood of all residuals in pixels, `D(w) − 6 N ln w` is least for `N` planes.
+//! Neighbouring depths have the same error, so a plane is treated as if all its depths had one common error, with one standard
+//! deviation that all views share. It is the one that makes the residuals most likely (REML): with `w` pixels of corner error per
+//! metre, and `D(w)` minus twice the log of the restricted likelihood of all residuals in pixels, `D(w) − 6 N ln w` is least for
+//! `N` planes.
 //!
-//! Depths tell the tilt of the camera better than anything else, if they are measured along the lens itself, as a renderer does and a
-//! camera whose image is the one that depths are found in; where a second sensor measures them its own mounting is in them. So there
-//! are two models, one without a tilt and one with a tilt of unknown size, as likely as each other before any data. The answer is
-//! that of the likelier one, and its covariance that of both, as likely as they are then.
+//! Depths determine the tilt of the camera better than anything else, if they are measured along the lens itself, as a renderer
+//! does and a camera whose depths are found in its own image; where a second sensor measures them its mounting is part of them. So
+//! there are two models, one without a tilt and one with a tilt of unknown size, as likely as each other before any data. The
+//! answer is that of the likelier one, and its covariance that of both, as likely as they are then.
 //!
 //! Source: Hoeting et al. 1999, "Bayesian model averaging: a tutorial", Statistical Science 14 (the mixture of two models).
 //! `docs/maths/depth_camera.md`.
@@ -26,33 +27,33 @@ use handeye_geometry::statistics::median_high;
 use handeye_geometry::targets::depth_plane::{DepthPlane, are_of_right_size};
 use handeye_geometry::view_equations::{DepthBias, PredictedDepths};
 
-/// Views with depths that tell five errors of them, with thirteen numbers to spare for their noise.
+/// Least number of views with depths to determine five errors of them, with thirteen numbers to spare for their noise.
 pub const FEWEST: usize = 6;
 /// Least standard deviation of depths, metres: what a 32-bit float resolves in some metres.
 const LEAST_M: f64 = 1e-6;
-/// Where the level is looked for, as a factor of the scatter of the depths about the estimate without them: some of that is the
-/// estimate's own error.
+/// Range in which the level is searched, as a factor of the scatter of the depths about the estimate without them: part of that
+/// is the estimate's own error.
 const RANGE: (f64, f64) = (0.05, 2.0);
-/// Levels that are tried: the range is then down to a third of a logarithm, its last two a twelfth apart, and thirty numbers tell a
-/// level to an eighth.
+/// Levels that are tried: the range is then down to a third of a logarithm, its last two a twelfth apart, and thirty numbers
+/// determine a level to an eighth.
 const TRIED: usize = 7;
 
 /// An estimate with depths.
 #[derive(Debug, Clone)]
 pub struct WithDepths {
-    /// How they count.
+    /// Weight of the depths.
     pub weight: DepthWeight,
-    /// Views whose depths are in it.
+    /// Number of views whose depths are used.
     pub views: usize,
     /// The estimate of the likelier model.
     pub solution: JointSolution,
     /// What the other model adds.
     pub other: OtherModel,
-    /// Errors of the depth camera by the model that leaves its tilt open, and their covariance.
+    /// Errors of the depth camera by the model with a free tilt, and their covariance.
     pub open: (DepthBias, Matrix5<f64>),
 }
 
-/// What a model that is less likely adds to what is not known.
+/// What the less likely model adds to the uncertainty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OtherModel {
     pub probability: f64,
@@ -67,8 +68,8 @@ impl OtherModel {
     }
 }
 
-/// The estimate with the depths of the views; `without` is that without them. `None` where too few views have depths, these are in
-/// another unit, or the noise levels are given.
+/// The estimate with the depths of the views; `without` is the estimate without them. `None` where too few views have depths,
+/// these are in another unit, or the noise levels are given.
 ///
 /// # Errors
 /// [`HandEyeError::Cancelled`].
@@ -116,7 +117,7 @@ fn likeliest(
         let start = best.as_ref().map_or(without, |near| &near.solution).as_start();
         let Some(solution) = determined(fit(&with, &start, cancel))? else { return Ok(f64::INFINITY) };
         let Some(deviance) = solution.deviance else { return Ok(f64::INFINITY) };
-        // The deviance leaves out the normalising terms of what is known beforehand.
+        // The deviance leaves out the normalising terms of the priors.
         let unlikely = deviance - 6.0 * views as f64 * weight.px_per_m.ln() + 4.0 * weight.tilt_sigma_rad().ln();
         if best.as_ref().is_none_or(|best| unlikely < best.unlikely) {
             best = Some(Model { unlikely, weight, solution });
@@ -127,8 +128,8 @@ fn likeliest(
     Ok(best)
 }
 
-/// Tries a function of a positive number that has one minimum in a range nearer and nearer to it (golden section over the
-/// logarithm).
+/// Evaluates a function of a positive number that has one minimum in a range at points converging to it (golden section
+/// over the logarithm).
 fn towards_least(mut of: impl FnMut(f64) -> Result<f64, HandEyeError>, range: [f64; 2]) -> Result<(), HandEyeError> {
     const PART: f64 = 0.618_033_988_749_894_9;
     let [mut low, mut high] = range.map(f64::ln);
@@ -150,8 +151,8 @@ fn towards_least(mut of: impl FnMut(f64) -> Result<f64, HandEyeError>, range: [f
     Ok(())
 }
 
-/// Scatter of the depths about the targets of an estimate, once the errors of the depth camera are taken off, metres; `None` where
-/// they are not even of the right size.
+/// Scatter of the depths about the targets of an estimate, once the errors of the depth camera are subtracted, metres; `None`
+/// where they are not even of the right size.
 fn scatter_m(problem: &JointProblem<'_>, without: &JointSolution) -> Option<f64> {
     let planes: Vec<(&DepthPlane, PredictedDepths)> = problem
         .views

@@ -39,7 +39,7 @@ pub fn check(problem: &JointProblem<'_>, solution: &JointSolution, work: &Work<'
     Ok(compare(&pairs))
 }
 
-/// Squares of the residuals of one view at its reported pose after a step: shown and promised.
+/// Squares of the residuals of one view at its reported pose after a step: shown and predicted.
 fn squares(seen: &ViewBlock, step: &DVector<f64>, covariance: &DMatrix<f64>, noise: &Noise) -> (f64, f64) {
     let shown = seen.residual.norm_squared()
         + seen.rest.squared_px

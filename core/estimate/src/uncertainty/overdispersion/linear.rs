@@ -1,4 +1,4 @@
-//! What every view does to the answer, to first order.
+//! The effect of every view on the answer, to first order.
 
 use nalgebra::{DMatrix, Matrix6, UnitQuaternion, Vector6};
 
@@ -66,7 +66,7 @@ impl LinearView {
     ) -> Option<Self> {
         let noise = &solution.noise;
         let (information, gradient) = block.information(noise, correction)?;
-        // C M C less what the view's own part in the estimate takes of it, C M C M C.
+        // C M C less C M C M C, due to the view's own part in the estimate.
         let by_view = &covariance.whitened * information;
         let expected = &by_view * covariance.whitened.transpose() - &by_view * &covariance.all * by_view.transpose();
         // An error d of the robot shows as own⁻¹ P d in the correction, and its effect on the rest goes through `cross`.
@@ -87,7 +87,7 @@ impl LinearView {
     }
 }
 
-/// Turns translation and rotation vector alike.
+/// Turns translation and rotation vector equally.
 fn turned(rotation: &UnitQuaternion<f64>) -> Matrix6<f64> {
     let r = rotation.to_rotation_matrix().into_inner();
     let mut out = Matrix6::zeros();

@@ -1,4 +1,4 @@
-//! Whether the robot errs alike in neighbouring poses, and what that does to the answer.
+//! Whether the robot has similar errors in neighbouring poses, and the effect of that on the answer.
 //!
 //! The errors of two poses are taken to have the correlation `share · exp(−d²/2)`, where `d` is their distance over
 //! [`REACH_M`] and [`REACH_RAD`]. The share is the slope of the products of estimated errors against the exponential. With
@@ -12,8 +12,8 @@ use super::permutation;
 use super::{Check, Evidence};
 use crate::handeye::subset;
 
-/// Distance over which the error of an arm stays alike: errors of joints keep their sign over the better part of a turn,
-/// and a joint moves the tip of a middling arm by half a metre per radian.
+/// Distance over which the error of an arm stays similar: errors of joints keep their sign over the better part of a
+/// turn, and a joint moves the tip of a medium-sized arm by half a metre per radian.
 const REACH_M: f64 = 0.5;
 /// The same for its orientation.
 const REACH_RAD: f64 = 1.0;
@@ -23,7 +23,7 @@ const LEAST_ERROR: f64 = 1e-6;
 /// Compares the products of the errors of all pairs of poses with their nearness.
 pub fn check(views: &[LinearView]) -> Check {
     let none = Check { by: Evidence::Neighbours, ratio: 1.0, p_value: 1.0 };
-    // Pairs grow with the square; a choice of views tells as much about the correlation as anybody needs.
+    // Pairs grow with the square; a subset of the views determines the correlation well enough.
     let chosen: Vec<&LinearView> =
         subset::spread(views.len(), subset::MOST_VIEWS).into_iter().map(|i| &views[i]).collect();
     let count = chosen.len();
@@ -46,7 +46,8 @@ pub fn check(views: &[LinearView]) -> Check {
         let both = chosen[i].by_robot * chosen[j].by_robot.transpose() * k;
         more += both + both.transpose();
     }
-    // Of more views than were chosen each has so many more neighbours, while the stated variance is as much smaller.
+    // With more views than were chosen each has that many more neighbours, while the stated variance is as much
+    // smaller.
     let widened = Matrix6::identity() + more * (share * views.len() as f64 / count as f64);
     // One factor has to hold in every direction, and so at every point that is measured.
     Check { by: Evidence::Neighbours, ratio: widened.symmetric_eigenvalues().max(), p_value }

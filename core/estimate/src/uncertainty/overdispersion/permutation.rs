@@ -2,7 +2,8 @@
 
 use crate::handeye::draw::Draw;
 
-/// Random orders that an observed one is compared with; the smallest probability they can tell is one in so many and one.
+/// Random orders that an observed one is compared with; the smallest probability they can show is one in this many plus
+/// one.
 pub const ORDERS: usize = 499;
 
 /// Start of the sequence. Any number does; that it is fixed makes the same data give the same answer.

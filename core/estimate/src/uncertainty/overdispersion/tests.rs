@@ -80,7 +80,7 @@ fn f95(a: usize, b: f64) -> f64 {
 
 #[test]
 fn healthy_sessions_are_left_alone() {
-    // Three in a hundred are widened by chance at the most; of forty then more than five in one case in five hundred.
+    // At most three in a hundred are widened by chance; of forty then more than five in one case in five hundred.
     let (widened, factor, lines) = study(40, 10, false, 0.0, &REALISTIC);
     println!("widened {widened:.3}, mean factor {factor:.3}; {lines:?}");
     assert!(widened <= 5.0 / 40.0, "{widened}");
@@ -88,7 +88,7 @@ fn healthy_sessions_are_left_alone() {
 
 #[test]
 fn errors_that_neighbouring_poses_share_widen_the_uncertainty() {
-    // A robot that is off by 4 mm per metre, systematically, where its own noise is a tenth of a millimetre.
+    // A robot with a systematic error of 4 mm per metre, where its own noise is a tenth of a millimetre.
     let mut t = trial(Mode::EyeInHand, 24, &REALISTIC, camera(), 77);
     bend(&mut t, 0.004);
     let (solution, widening) = solve(&t, false);
@@ -142,7 +142,7 @@ fn study_of_healthy_and_bent_sessions() {
             (20, true, &noisy),
         ],
     );
-    // Three checks at one in a hundred: 3 % of healthy sessions at the most; four standard deviations are allowed for.
+    // Three checks at one in a hundred: at most 3 % of healthy sessions; four standard deviations are allowed for.
     let sessions = 7.0 * trials as f64;
     assert!(healthy <= 0.03 + 4.0 * (0.03 * 0.97 / sessions).sqrt(), "{healthy} of {sessions} healthy sessions");
     // Forty times the robot's own noise over a metre is found in most sessions; a tenth of that noise's share is not.

@@ -29,9 +29,9 @@ pub struct HeldOut {
     pub rms_m: f64,
 }
 
-/// How far the middle of the target, as a view puts it, lies from where the fit puts it: the distance in the anchor frame
-/// between `anchor_from_mount * mount_from_camera * camera_from_target * centre` and `anchor_from_target * centre`, metres,
-/// with the target's pose in the camera found from the corners of the view alone.
+/// Distance of the middle of the target by a view from that by the fit: the distance in the anchor frame between
+/// `anchor_from_mount * mount_from_camera * camera_from_target * centre` and `anchor_from_target * centre`, metres, with
+/// the target's pose in the camera found from the corners of the view alone.
 pub fn board_error_m(
     anchor_from_mount: &Pose<Anchor, Mount>,
     mount_from_camera: &Pose<Mount, Camera>,
@@ -44,7 +44,7 @@ pub fn board_error_m(
 }
 
 /// [`HeldOut`] over five folds (or one view at a time when there are fewer than ten). View `i` is in fold `i mod folds`. The
-/// answer without a fold is one Newton step from that of all views, whose equations are at hand, so that no view is
+/// answer without a fold is one Newton step from that of all views, whose equations are available, so that no view is
 /// linearised again: what the step leaves is of second order in its length. Noise levels are kept: without a fifth of the
 /// views they differ by a few percent, which moves a prediction by much less than its error.
 ///
@@ -69,7 +69,7 @@ pub fn held_out<'a>(
     }))
 }
 
-/// Of every view the squares of its prediction by a fit without its fold, as in [`held_out`].
+/// For every view the squares of its prediction by a fit without its fold, as in [`held_out`].
 fn predicted_by_view(
     problem: &JointProblem<'_>,
     solution: &JointSolution,
@@ -115,19 +115,19 @@ impl Squares {
     }
 }
 
-/// Probability that a model predicts views left out better by chance, at which it is believed to. Eight views that all gain
-/// come about by chance four times in a thousand: with fewer nothing is shown so.
+/// Probability that a model predicts views left out better by chance, below which it counts as better. Eight views that all
+/// gain come about by chance four times in a thousand: with fewer views this cannot be shown.
 pub const BY_CHANCE: f64 = 5e-3;
 
-/// Probability that views left out are predicted worse by chance, at which they are.
+/// Probability that views left out are predicted worse by chance, below which it counts as worse.
 const WORSE_BY_CHANCE: f64 = 0.05;
 
-/// What a view left out is predicted by.
+/// The model by which a view left out is predicted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum PredictedBy {
     /// All of the model.
     Model,
-    /// The model without a field that goes with reported poses: what they predict as they are.
+    /// The model without the field of reported poses: the prediction by uncorrected poses.
     Links,
 }
 
@@ -136,7 +136,7 @@ pub(crate) enum PredictedBy {
 pub(crate) struct Compared {
     /// RMS of 2-D corner residuals by the first, pixels.
     pub before_px: f64,
-    /// By the second.
+    /// The same by the second.
     pub after_px: f64,
     /// Whether the second predicts worse, by more than chance: signed ranks of the squares view by view, once in twenty.
     pub is_worse: bool,
@@ -192,7 +192,7 @@ fn prediction_squares(problem: &JointProblem<'_>, fit: &State, view: &View) -> O
 const STEPS: usize = 10;
 
 /// The target's pose from the corners of one view alone, from one nearby; `None` when that puts a corner behind the
-/// camera. Where the corners determine no pose the start is returned.
+/// camera. Where the corners do not determine a pose the start is returned.
 pub fn pose_of_view(
     intrinsics: &Intrinsics,
     board: &BoardPoints,
@@ -206,7 +206,7 @@ pub fn pose_of_view(
     )
 }
 
-/// The same with corners that count as they are weighed.
+/// The same with weighted corners.
 pub(crate) fn weighted_pose_of_view(seen: &ViewInput<'_>, start: &Isometry3<f64>) -> Option<Pose<Camera, Target>> {
     refine(seen, start, STEPS).map(|minimum| Pose::from_isometry(minimum.pose))
 }
@@ -219,7 +219,7 @@ mod tests {
     use crate::test_sessions::Estimated as _;
     use handeye_simulate::session::{camera, trial};
 
-    /// Views that stayed in the fit would be predicted too well, and nobody would see it.
+    /// Views that stayed in the fit would be predicted too well, which would not be noticed.
     #[test]
     fn views_held_out_are_predicted_as_by_fits_that_never_saw_them() {
         let noise = Noise { corner_px: 0.1, robot_m: 5e-4, robot_rad: 1.7e-3, ..Noise::EXACT };

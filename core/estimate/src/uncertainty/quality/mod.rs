@@ -1,4 +1,4 @@
-//! What a calibration is worth: expected error in millimetres, and error on views it has not seen.
+//! The quality of a calibration: expected error in millimetres, and error on views it has not seen.
 
 mod held_out;
 mod tip_box;
@@ -13,8 +13,8 @@ pub(crate) use held_out::{PredictedBy, compared, weighted_pose_of_view};
 pub use tip_box::{BoxError, TipBox, tip_error_95_over};
 
 /// Expected error of a point that the camera measures, at the place where it saw the target: 95 % of errors are below
-/// this many metres. It counts the hand-eye transform alone, with what robot and corner noise did to it; the noise of
-/// a later robot pose or image comes on top.
+/// this many metres. It counts the hand-eye transform alone, with the effect of robot and corner noise on it; the noise
+/// of a later robot pose or image comes on top.
 pub fn tip_error_95_m(solution: &JointSolution) -> f64 {
     tip_error_95_at(&solution.hand_eye_covariance(), solution.small_sample, &solution.reference_point)
 }

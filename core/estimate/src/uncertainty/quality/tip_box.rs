@@ -21,8 +21,8 @@ impl TipBox {
         Self { low: a.inf(&b), high: a.sup(&b), camera_from_box: Isometry3::identity() }
     }
 
-    /// A box in the robot's base between two opposite corners \[m\]. For a camera beside the robot `camera_from_base` is
-    /// the inverse of the calibration; for one on the tip it holds at the tip pose from which the box will be seen,
+    /// A box in the robot's base between two opposite corners \[m\]. For a camera next to the robot `camera_from_base`
+    /// is the inverse of the calibration; for one on the tip it holds at the tip pose from which the box will be seen,
     /// because the error of a point depends on where the camera sees it.
     pub fn in_base(a: Point3<f64>, b: Point3<f64>, camera_from_base: &Pose<Camera, Base>) -> Self {
         Self { camera_from_box: *camera_from_base.isometry(), ..Self::in_camera(a, b) }
@@ -63,11 +63,11 @@ pub struct BoxError {
 const NODES: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
-/// Expected error (95 %) of measured points over a box: the worst of it, where that is, and the mean.
+/// Expected error (95 %) of measured points over a box: the worst one, its place, and the mean.
 ///
 /// `error_95_m` is the error at a point in camera coordinates. The error vector of a point, `t + r × p`, is linear in the
-/// point, so the mean of its square is a convex function of it, as is how far a transform moves it, and greatest at a
-/// corner of the box; the eight corners are compared.
+/// point, so the mean of its square is a convex function of it, as is the distance by which a transform moves it, and
+/// greatest at a corner of the box; the eight corners are compared.
 pub fn tip_error_95_over(error_95_m: impl Fn(&Point3<f64>) -> f64, tip_box: &TipBox) -> BoxError {
     let error = |part: &Vector3<f64>| {
         let at = tip_box.at(part);
@@ -77,7 +77,7 @@ pub fn tip_error_95_over(error_95_m: impl Fn(&Point3<f64>) -> f64, tip_box: &Tip
     for corner in 0..8u8 {
         let bit = |axis: u8| f64::from(corner >> axis & 1);
         let here = error(&Vector3::new(bit(0), bit(1), bit(2)));
-        // Written so that an error that is not a number is the worst.
+        // Written such that an error that is NaN is the worst.
         if here.0.is_nan() || here.0 > worst.0 {
             worst = here;
         }

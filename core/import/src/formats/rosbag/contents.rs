@@ -1,4 +1,4 @@
-//! What the messages of a bag say, by time.
+//! The contents of a bag's messages, by time.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -13,7 +13,7 @@ use handeye_files::budget::Budget;
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_wording::Text;
 
-/// Most messages of one kind that are kept, and most things that are told apart.
+/// Most messages of one kind that are kept, and most topics or frames that are distinguished.
 pub(super) const MOST_MESSAGES: usize = 2_000_000;
 const MOST_NAMES: usize = 10_000;
 /// Joints of the largest robots.
@@ -25,9 +25,9 @@ pub(super) type Timed<T> = Vec<(i64, T)>;
 #[derive(Default)]
 pub(super) struct Bag {
     pub frames: Frames,
-    /// By topic.
+    /// Poses by topic.
     pub poses: BTreeMap<String, Timed<Isometry3<f64>>>,
-    /// By topic and names of the joints: what moves an arm and what moves its gripper may say so on one topic.
+    /// Joint values by topic and names of the joints: those of an arm and of its gripper may be published on one topic.
     pub joints: BTreeMap<(String, Vec<String>), Timed<Vec<f64>>>,
     pub cameras: BTreeMap<String, FoundCamera>,
     /// Stamps of images by topic.
@@ -38,11 +38,11 @@ impl Bag {
     /// Reads the files of a bag, in order.
     ///
     /// # Errors
-    /// A sentence, where one is no bag or the budget is spent.
+    /// A sentence, where one is not a bag or the budget is spent.
     pub fn read(parts: &[PathBuf], budget: &Budget<'_>) -> Result<Self, Text> {
         let mut bag = Self::default();
         for part in parts {
-            // A message that is not as its type says is left out.
+            // A message that does not match its type is left out.
             storage::visit(part, budget, &mut |message| {
                 let _read = bag.take(&message);
             })?;
@@ -119,7 +119,7 @@ impl Bag {
         Some(())
     }
 
-    /// Whether nothing moves from one time to another, as far as anything says so.
+    /// Whether nothing moves from one time to another, as far as the messages show.
     pub fn is_still(&self, from: i64, to: i64) -> bool {
         let mut reported = false;
         for moving in self.frames.moving().chain(self.poses.values()) {
@@ -157,14 +157,14 @@ fn keep<K: Ord, V>(all: &mut BTreeMap<K, Vec<V>>, key: K, value: V) {
     }
 }
 
-/// What lies between two times.
+/// The values between two times.
 pub(super) fn between<T>(values: &[(i64, T)], from: i64, to: i64) -> &[(i64, T)] {
     let start = values.partition_point(|(stamp, _)| *stamp < from);
     let end = values.partition_point(|(stamp, _)| *stamp <= to);
     &values[start..end.max(start)]
 }
 
-/// What is nearest in time, if it is near.
+/// The value nearest in time, if it is near enough.
 pub(super) fn nearest<T>(values: &[(i64, T)], stamp: i64, within_ns: i64) -> Option<&T> {
     let near = between(values, stamp.saturating_sub(within_ns), stamp.saturating_add(within_ns));
     near.iter().min_by_key(|(other, _)| other.abs_diff(stamp)).map(|(_, value)| value)

@@ -41,12 +41,12 @@ impl Frames {
         }
     }
 
-    /// Of every frame that is not stated to be static, its poses in its parent.
+    /// The poses in its parent of every frame that is not stated to be static.
     pub fn moving(&self) -> impl Iterator<Item = &Timed<Isometry3<f64>>> {
         self.0.values().filter(|frame| !frame.is_static).map(|frame| &frame.parent_from_frame)
     }
 
-    /// A frame and those above it, up to the root, which has none; they end where a tree that is none goes in a circle.
+    /// A frame and its ancestors, up to the root; they end where frames form a cycle.
     fn upwards<'a>(&'a self, name: &'a str) -> impl Iterator<Item = (&'a str, &'a Link)> {
         let of = |name: &'a str| self.0.get(name).map(|frame| (name, frame));
         std::iter::successors(of(name), move |(_, frame)| of(&frame.parent)).take(self.0.len() + 1)
@@ -56,13 +56,13 @@ impl Frames {
         self.upwards(name).last().map_or(name, |(_, frame)| frame.parent.as_str()).to_owned()
     }
 
-    /// Where a frame is in the root, by the transforms nearest in time; `None` where one is not near, and in a circle.
+    /// Pose of a frame in the root, by the transforms nearest in time; `None` where one is not near enough, and in a
+    /// cycle.
     pub fn root_from(&self, name: &str, stamp: i64, within_ns: i64) -> Option<Isometry3<f64>> {
         self.composed(name, |poses| nearest(poses, stamp, within_ns).copied())
     }
 
-    /// As [`root_from`](Self::root_from), of a frame that moves: turned evenly and moved straight between the transforms before
-    /// and after.
+    /// As [`root_from`](Self::root_from), for a moving frame: interpolated between the transforms before and after.
     pub fn root_from_in_motion(&self, name: &str, stamp: i64, within_ns: i64) -> Option<Isometry3<f64>> {
         self.composed(name, |poses| interpolated(poses, stamp, within_ns))
     }
@@ -88,7 +88,7 @@ impl Frames {
         Some(pose)
     }
 
-    /// When something is said of a frame that moves: by the stamps of the one among it and those above it that has most.
+    /// Times at which a moving frame is known: the timestamps of the one among it and its ancestors that has most.
     pub fn stamps_of(&self, name: &str) -> Vec<i64> {
         let moving =
             self.upwards(name).filter(|(_, frame)| !frame.is_static).map(|(_, frame)| &frame.parent_from_frame);

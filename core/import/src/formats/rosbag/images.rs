@@ -19,8 +19,8 @@ pub(super) fn name(topic: &str, stamp: i64) -> String {
     format!("{topic}_{stamp}.png")
 }
 
-/// Writes the chosen images into a folder of this machine's temporary files, which goes with the recording. Those of a robot that
-/// moves keep their stamps.
+/// Writes the chosen images into a folder of this machine's temporary files, which is deleted with the recording. Those of a
+/// moving robot keep their timestamps.
 ///
 /// # Errors
 /// A sentence, where nothing can be written there or the budget is spent.
@@ -47,7 +47,7 @@ pub(super) fn unpack(
             let saved = decoded(&message).and_then(|image| image.save(&path).map(|()| image).map_err(|e| foreign(&e)));
             match saved {
                 Ok(image) => {
-                    // What it takes on the disk is less than this, and not more than it tells.
+                    // An upper bound of its size on disk.
                     let _spent = budget.unpack(image.as_bytes().len() as u64);
                     let stream = streams.entry(message.topic.to_owned()).or_insert_with(|| Stream {
                         name: message.topic.to_owned(),
@@ -107,7 +107,7 @@ fn decoded(message: &Message) -> Result<DynamicImage, Text> {
     raw(&encoding, (width, height), step, bytes)
 }
 
-/// An image of which every row takes `step` bytes.
+/// An image with `step` bytes per row.
 fn raw(encoding: &str, (width, height): (u32, u32), step: usize, bytes: &[u8]) -> Result<DynamicImage, Text> {
     let none = || text!("its size is none");
     let channels = match encoding {

@@ -8,15 +8,15 @@ use crate::formats::tree;
 use crate::recording::{Known, Motion, Role};
 use handeye_estimate::handeye::subset;
 
-/// Transforms of one chain that are farther apart than this say nothing of what is between them.
+/// Transforms of one chain that are farther apart in time than this are not interpolated.
 const GAP_NS: i64 = 250_000_000;
-/// Images of a motion that are looked at at the most, and how many of them are neighbours: angles over a third of a second
-/// tell the time, and views from everywhere tell the rest.
+/// Most images of a motion that are used, and how many of them are consecutive: angles over a third of a second determine
+/// the time offset, and views from everywhere the rest.
 const MOST: usize = 400;
 const NEIGHBOURS: usize = 300;
 /// No two of them are nearer in time than this.
 const APART_NS: i64 = 50_000_000;
-/// Fewer tell no offset.
+/// Fewer images do not determine an offset.
 const LEAST: usize = 60;
 
 /// The poses of every frame that may be the tip, and of every topic of poses, in motion.
@@ -43,7 +43,7 @@ pub(super) fn motions(bag: &Bag, file: &str) -> Vec<Motion> {
     out
 }
 
-/// The stamps of images to look at, in order; none where there are too few of them, or no robot beside them.
+/// The timestamps of the images to use, in order; none where there are too few of them, or no robot at these times.
 pub(super) fn chosen(stamps: &[i64], motions: &[Motion]) -> Vec<i64> {
     let mut apart: Vec<i64> = Vec::new();
     for stamp in stamps {

@@ -235,7 +235,7 @@ fn a_bag_of_ros_1_is_read_like_one_of_ros_2_however_it_is_compressed() {
     }
 }
 
-/// As a recorder leaves it that was killed: the last chunk ends early and there is no index.
+/// As left by a recorder that was killed: the last chunk ends early and there is no index.
 #[test]
 fn a_bag_of_ros_1_that_breaks_off_has_what_came_before() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -283,7 +283,7 @@ fn a_file_that_never_stops_growing_is_refused() {
     assert_eq!(budget.check(), Err(Spent::Unpacked(limits.unpacked_bytes)));
 }
 
-/// A chunk that says that it has more than its frame of LZ4 holds: what waits for the rest waits for ever.
+/// A chunk that states more bytes than its LZ4 frame holds: waiting for the rest would never end.
 #[test]
 fn a_chunk_that_is_shorter_than_it_says_ends() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -328,7 +328,7 @@ fn a_view_in_the_place_of_a_table_is_not_run() {
     }
 }
 
-/// By a clock that goes on whenever it is looked at.
+/// With a clock that advances whenever it is read.
 #[test]
 fn a_bag_of_every_kind_is_given_up_when_its_time_is_over_or_a_person_ends_it() {
     let folder = tempfile::tempdir().expect("a folder");

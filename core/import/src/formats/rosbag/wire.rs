@@ -3,12 +3,12 @@
 
 use nalgebra::{Isometry3, Quaternion, Translation3, Unit};
 
-/// How messages are encoded.
+/// Encoding of messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Encoding {
-    /// That of ROS 2.
+    /// CDR, the encoding of ROS 2.
     Cdr,
-    /// That of ROS 1: little end first, headers with a number of their own.
+    /// The encoding of ROS 1: little-endian, headers with a sequence number.
     Ros1,
 }
 
@@ -28,7 +28,7 @@ pub(super) struct Header {
 }
 
 impl<'a> Reader<'a> {
-    /// In CDR behind the four bytes that say how the rest is encoded.
+    /// In CDR it starts after the four bytes that state the encoding of the rest.
     pub fn new(encoding: Encoding, message: &'a [u8]) -> Option<Self> {
         if encoding == Encoding::Ros1 {
             return Some(Self { bytes: message, at: 0, is_little: true, encoding });

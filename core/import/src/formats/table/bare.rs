@@ -1,4 +1,4 @@
-//! Tables without a header: what the numbers themselves say of where a pose stands.
+//! Tables without a header: the columns of a pose are found from the numbers.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -29,11 +29,11 @@ pub(super) fn blocks(file: &str, rows: &[&Line]) -> Option<Track> {
     tree::track(file.to_owned(), file, Stated::default(), samples?)
 }
 
-/// Of the rows those that a pose may be, in a report among whose rows others stand, are at least one in so many: a matrix is
-/// often printed below its pose.
+/// In a report that has other rows as well, at least one row in this many may be a pose: a matrix is often printed below its
+/// pose.
 const MOST_ROWS_TO_A_POSE: usize = 8;
 
-/// Numbers that belong together, a row of a table or a file, and what stands with them.
+/// Numbers that belong together, a row of a table or a file, and what is next to them.
 pub(in crate::formats) struct Row {
     pub image: Option<String>,
     pub number: Option<u64>,
@@ -53,7 +53,7 @@ pub(super) fn without_header(file: &str, lines: &[&Line]) -> Vec<Track> {
     widths.sort_by_key(|rows| std::cmp::Reverse(rows.len()));
     widths.retain(|rows| MOST_ROWS_TO_A_POSE * rows.len() >= lines.len());
     let found = widths.into_iter().map(|mut rows| {
-        // What stands in all rows is no name of one.
+        // A name that is in all rows is not the name of one.
         let first = rows.first().and_then(|row| row.image.clone());
         if rows.len() > 1 && rows.iter().all(|row| row.image == first) {
             for row in &mut rows {
@@ -112,7 +112,7 @@ pub(in crate::formats) fn tracks(name: &str, rows: &[Row]) -> Vec<Track> {
     tracks
 }
 
-/// In which order the numbers of a pose stand, where they do not say it themselves.
+/// The order of the numbers of a pose, where it does not follow from the numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Order {
     /// The commonest: the translation first, matrices by rows.
@@ -133,12 +133,12 @@ impl Order {
     }
 }
 
-/// Where a pose stands among the numbers of a row.
+/// Columns of a pose among the numbers of a row.
 #[derive(Debug, Clone)]
 struct Layout {
     first: usize,
     width: usize,
-    /// The quaternion or the rotation matrix stands before the translation.
+    /// The quaternion or the rotation matrix precedes the translation.
     is_rotation_first: bool,
     order: Order,
     index: Option<usize>,
@@ -180,7 +180,8 @@ fn rotation(numbers: &[f64]) -> Option<Matrix3<f64>> {
     is_rotation(&turn).then_some(turn)
 }
 
-/// Where poses may stand: matrices and quaternions are known by their numbers, six numbers are what is left.
+/// Possible columns of poses: matrices and quaternions are recognised by their numbers, six numbers are the remaining
+/// case.
 fn layouts(rows: &[&[f64]]) -> Vec<Layout> {
     let width = rows[0].len();
     let most = |test: &dyn Fn(&[f64]) -> bool| 10 * rows.iter().filter(|row| test(row)).count() >= 9 * rows.len();
@@ -247,10 +248,10 @@ fn layouts(rows: &[&[f64]]) -> Vec<Layout> {
     }
 }
 
-/// Whether most rows are such.
+/// Whether most rows satisfy a predicate.
 type Most<'a> = dyn Fn(&dyn Fn(&[f64]) -> bool) -> bool + 'a;
 
-/// Poses that are known by their numbers, one beside the other in a row: of the robot and of the target.
+/// Poses that are recognised by their numbers, side by side in a row: of the robot and of the target.
 fn side_by_side(width: usize, most: &Most<'_>, with: &dyn Fn(usize, usize, bool) -> Layout) -> Vec<Layout> {
     let mut found: Vec<Layout> = Vec::new();
     let mut first = 0;
@@ -273,7 +274,7 @@ fn side_by_side(width: usize, most: &Most<'_>, with: &dyn Fn(usize, usize, bool)
         }) {
             found.push(with(first, 7, is_rotation_first));
         }
-        // What stands beside them is another pose, and no joint values.
+        // The other columns are another pose, not joint values.
         found[before..].iter_mut().for_each(|layout| layout.joints = None);
         first = found.get(before).map_or(first + 1, |layout| layout.first + layout.width);
     }

@@ -1,8 +1,8 @@
-//! A text as rows of cells, whatever stands between them.
+//! A text as rows of cells, whatever separates them.
 
 use crate::value::number;
 
-/// Numbers in a row at the most that are looked at.
+/// Most numbers in a row that are read.
 const MOST_COLUMNS: usize = 64;
 
 /// A line as cells.
@@ -84,13 +84,13 @@ fn without_brackets(line: &str) -> String {
     out
 }
 
-/// Of every bracket that opens, the last one first, whether a list begins there: a number, and something between it and the next
-/// bracket that closes which parts numbers. One number in parentheses is a part of a name, as of a copy that was made. A line is
-/// read once, from its end, however many brackets it has.
+/// For every opening bracket, the last one first, whether a list begins there: a number, and a separator between it and the next
+/// closing bracket. A single number in parentheses is part of a name, for example of a copy. A line is read once, from its end,
+/// however many brackets it has.
 fn lists(line: &str) -> Vec<bool> {
     let mut lists = Vec::new();
-    // Of what lies between here and the next bracket that closes: whether something stands there, whether it begins with a
-    // blank, whether something is parted.
+    // For the text up to the next closing bracket: whether there is any, whether it begins with a blank, whether it has a
+    // separator.
     let (mut has_more, mut is_after_blank, mut is_parted) = (false, false, false);
     let mut next = None;
     for c in line.chars().rev() {

@@ -1,4 +1,4 @@
-//! Tables with a header, which says what the columns are.
+//! Tables with a header, which names the columns.
 
 use nalgebra::Matrix4;
 
@@ -9,10 +9,10 @@ use crate::formats::{joints, tree};
 use crate::recording::{JointSeries, Known, Numbers, Role, Stated, Track};
 use crate::value::number;
 
-/// Columns of joint values that say by themselves what they are: fewer may be angles of anything.
+/// Number of columns that are recognised as joint values without further hints: fewer may be angles of anything.
 const LEAST_JOINTS: usize = 4;
 
-/// What a header calls a column, without its unit; and the unit.
+/// The name of a column without its unit; and the unit.
 fn column(name: &str) -> (String, Option<&'static str>) {
     let lower = name.to_lowercase();
     let lower = lower.trim().trim_matches(['"', '\'']);
@@ -146,7 +146,7 @@ pub(super) fn with_header(file: &str, lines: &[Line]) -> Option<Vec<Track>> {
     Some(vec![track])
 }
 
-/// Columns that stand with those of a pose.
+/// Columns next to those of a pose.
 struct ExtraColumns {
     image: Option<usize>,
     index: Option<usize>,

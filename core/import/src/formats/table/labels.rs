@@ -1,4 +1,4 @@
-//! Tables in which every row says what it is of, `hand,…` above `eye,…`: a series to each of the words.
+//! Tables in which a label starts every row, `hand,…` above `eye,…`: one series per label.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use crate::formats::tree::{self, LEAST_POSES, is_image_name};
 use crate::recording::Role;
 use crate::value::number;
 
-/// Words of one table at the most: more are names of rows.
+/// Most labels of one table: more are names of rows.
 const MOST_LABELS: usize = 4;
 
 /// The rows of one word.
@@ -16,11 +16,11 @@ pub(super) struct Group {
     pub role: Role,
     /// With the words left out.
     pub lines: Vec<Line>,
-    /// Which record each row is of: that of its word, or counted.
+    /// The record of each row: by its label, or counted.
     pub numbers: Vec<u64>,
 }
 
-/// The word of a row without what counts behind it, its cell, and that number.
+/// The label of a row without the counter after it, its cell, and that counter.
 fn label(line: &Line) -> Option<(String, usize, Option<u64>)> {
     let is_word = |cell: &&String| cell.contains(char::is_alphabetic) && number(cell).is_none();
     let cell = line.cells.iter().position(|cell| is_word(&cell))?;
@@ -43,7 +43,7 @@ pub(super) fn groups(lines: &[Line]) -> Option<Vec<Group>> {
         *counts.entry(label).or_default() += 1;
     }
     let (least, most) = (counts.values().min().copied()?, counts.values().max().copied()?);
-    // A record has each of its words. Names of images of two places are seldom as many each, but for a row that is missing.
+    // A record has each of the labels. Image names of two places seldom occur equally often, except for a missing row.
     let is_series = (2..=MOST_LABELS).contains(&counts.len()) && least >= LEAST_POSES && most - least <= 1 + most / 10;
     if !is_series || 10 * labelled.len() < 9 * numeric.count() {
         return None;
@@ -51,7 +51,7 @@ pub(super) fn groups(lines: &[Line]) -> Option<Vec<Group>> {
     let header: Vec<&Line> = lines.iter().filter(|line| !line.is_numeric()).collect();
     let copy = |line: &Line| Line { row: line.row, cells: line.cells.clone() };
     let mut groups: Vec<Group> = Vec::new();
-    // A record begins where a word stands again.
+    // A record begins where a label is repeated.
     let (mut record, mut in_record) = (0, Vec::new());
     for (line, (label, cell, counted)) in &labelled {
         if in_record.contains(&label) {
@@ -72,7 +72,7 @@ pub(super) fn groups(lines: &[Line]) -> Option<Vec<Group>> {
     Some(groups)
 }
 
-/// What rows of this word are of. What the eye sees is the target.
+/// What rows with this label belong to. The eye sees the target.
 fn role(label: &str) -> Role {
     let is_eye = label.split(|c: char| !c.is_alphanumeric()).any(|word| word == "eye");
     if is_eye { Role::Target } else { tree::role(label) }

@@ -1,4 +1,4 @@
-//! Sessions that do not determine an answer: a typed error that says why, never a panic and never a number.
+//! Sessions that do not determine an answer: a typed error that states why, never a panic and never a number.
 
 use std::f64::consts::PI;
 
@@ -105,7 +105,8 @@ fn turns_about_the_mount_origin_leave_andreff_and_li_without_scale() {
     assert!(error < EXACT, "{error:e}");
 }
 
-/// Half turns about x, y and z look the same when two of the axes are reversed, so no rotation can be told apart.
+/// Half turns about x, y and z look the same when two of the axes are reversed, so the rotations cannot be
+/// distinguished.
 #[test]
 fn half_turns_alone_are_refused_by_the_methods_that_take_axes() {
     let views = views(&[([0.0; 3], [0.0; 3]), ([0.2, 0.1, 0.0], [PI, 0.0, 0.0]), ([0.0, -0.1, 0.2], [0.0, PI, 0.0])]);
@@ -115,7 +116,7 @@ fn half_turns_alone_are_refused_by_the_methods_that_take_axes() {
     assert!(no_solution_of("tsai_lenz", &views).contains("116°"));
     assert!(no_solution_of("shah", &views).contains("more than one rotation"));
     for name in ["andreff", "li"] {
-        // The translations decide.
+        // The translations determine the answer.
         let error = truth().error_of(&by_name(name).expect("exists").solve(&views).expect("determined"));
         assert!(error < EXACT, "{name}: {error:e}");
     }

@@ -16,13 +16,13 @@ const NOISE: f64 = 0.005;
 /// Rounding, 1e-16 on metres and radians, times a condition number of up to 1e5.
 const SAME: f64 = 1e-11;
 
-/// How far a method may be off when poses are off by up to `NOISE`: the translation along an axis about which the two
-/// sure tilts of [`robot_poses`] do not turn is worse than the poses by one over the sine of the tilt, on arms of metres.
-/// A wrong sign at the half turn is off by a radian.
+/// Largest error of a method when poses are off by up to `NOISE`: the translation along an axis about which the two sure
+/// tilts of [`robot_poses`] do not turn is worse than the poses by one over the sine of the tilt, on arms of metres. A
+/// wrong sign at the half turn is off by a radian.
 const STABLE: f64 = 20.0 * NOISE;
 
-/// Changes of frame that a method follows, by what the documentation of the methods promises: any change of the frame,
-/// a change of its axes only, or none.
+/// Changes of frame that a method follows, by the documentation of the methods: any change of the frame, a change of
+/// its axes only, or none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Follows {
     Any,

@@ -10,11 +10,11 @@ use crate::{Mode, PosePair};
 use handeye_geometry::frames::Pose;
 
 /// Largest difference in metres and in elements of the rotation matrix. Arithmetic alone leaves 3e-13. The margin is for
-/// OpenCV's `Rodrigues`, which takes turns below 1e-5 rad for none: where a robot came back to a pose within that, as
-/// in the KUKA session, its Park & Martin differs from the exact one by 4e-10.
+/// OpenCV's `Rodrigues`, which takes turns below 1e-5 rad for zero: where a robot came back to a pose within that, as in
+/// the KUKA session, its Park & Martin differs from the exact one by 4e-10.
 const REFERENCE_TOLERANCE: f64 = 1e-9;
 
-/// Names of the reference against ours.
+/// Names in the reference and ours.
 const METHODS: [(&str, &str); 7] = [
     ("Tsai", "tsai_lenz"),
     ("Park", "park_martin"),

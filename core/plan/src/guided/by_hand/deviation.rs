@@ -1,4 +1,4 @@
-//! How a view differs from the one that is wanted, and what to do about it, in words for somebody who looks at the image.
+//! How a view differs from the one that is wanted, and what to do about it, in words for a person who looks at the image.
 
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 
@@ -8,31 +8,31 @@ use handeye_geometry::targets::TargetSpec;
 use handeye_wording::Text;
 use handeye_wording::text;
 
-/// Angle within which a view is the one that is wanted: a hand gets there, and the gain hardly differs.
+/// Angle within which a view counts as the wanted one: a hand achieves it, and the gain hardly differs.
 const NEAR_RAD: f64 = 8.0 * std::f64::consts::PI / 180.0;
-/// The same for the place of the board, as part of the width of the image.
+/// The same for the position of the board, as a fraction of the width of the image.
 const NEAR_SHIFT: f64 = 0.08;
-/// The same for the distance, as part of it.
+/// The same for the distance, as a fraction of it.
 const NEAR_DISTANCE: f64 = 0.12;
 
-/// From the view that there is to the one that is wanted, as seen in the image.
+/// Difference from the present view to the wanted one, as seen in the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deviation {
     /// How far the middle of the board has to move to the right and down, as part of the width of the image.
     pub shift: Vector2<f64>,
     /// Distance along the line of sight that is wanted, metres.
     pub distance_m: f64,
-    /// That over the present one.
+    /// Wanted over present distance.
     pub distance_ratio: f64,
     /// Turn about the axes of the image to the right and down, after that about the line of sight, radians: a positive one
-    /// about the first takes the lower side of the board away from the camera, about the second the left side.
+    /// about the first moves the lower side of the board away from the camera, about the second the left side.
     pub tilt_rad: Vector2<f64>,
     /// Turn of the board in the image, clockwise, radians.
     pub roll_rad: f64,
 }
 
 impl Deviation {
-    /// `None` where the middle of the board is not before the camera in one of the two.
+    /// `None` where the middle of the board is not in front of the camera in one of the two.
     pub(crate) fn between(
         intrinsics: &Intrinsics,
         target: &TargetSpec,
@@ -55,12 +55,12 @@ impl Deviation {
         })
     }
 
-    /// Whether it is as good as the one that is wanted.
+    /// Whether the view is close enough to the wanted one.
     pub(crate) fn is_near(&self) -> bool {
         self.parts().into_iter().all(|(_, of_tolerance)| of_tolerance <= 1.0)
     }
 
-    /// What to change first: what is farthest from its tolerance. `None` where nothing is.
+    /// What to change first: the part farthest outside its tolerance. `None` where all are within.
     pub fn advice(&self) -> Option<Text> {
         let (part, _) = self
             .parts()
@@ -104,7 +104,7 @@ impl Deviation {
         })
     }
 
-    /// Each part over its tolerance.
+    /// Each part divided by its tolerance.
     fn parts(&self) -> [(Part, f64); 4] {
         [
             (Part::Shift, self.shift.norm() / NEAR_SHIFT),
@@ -141,7 +141,7 @@ mod tests {
     use handeye_simulate::session::camera;
     use handeye_wording::English;
 
-    /// A view of the middle of the board from 0.4 m, turned so.
+    /// A view of the middle of the board from 0.4 m, turned by this rotation vector.
     fn view(turn: Vector3<f64>) -> Pose<Camera, Target> {
         at(Vector3::new(0.0, 0.0, 0.4), turn)
     }

@@ -1,5 +1,5 @@
 //! The first views, from one view of the board, for a camera or a board that is moved by hand: tilted and turned as a person
-//! sees it in the image, because where the camera sits on the robot is not known yet.
+//! sees it in the image, because the place of the camera on the robot is not known yet.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
@@ -10,7 +10,7 @@ use handeye_geometry::frames::{Camera, Pose, Target};
 use handeye_geometry::targets::TargetSpec;
 
 /// Turns about the axes of the image to the right and down and about the line of sight \[deg\], against a view straight
-/// from the front. Any two beside the first view determine an answer.
+/// from the front. Any two in addition to the first view determine an answer.
 const TURNS_DEG: [[f64; 3]; 6] = [
     [25.0, 0.0, 0.0],
     [0.0, 25.0, 0.0],
@@ -23,7 +23,7 @@ const TURNS_DEG: [[f64; 3]; 6] = [
 const TRIES: [(f64, f64); 4] = [(1.0, 1.0), (1.0, 1.25), (0.6, 1.25), (0.4, 1.45)];
 
 /// View `index`, with the board in the middle of the image, about as far away as in the first view; `None` where the whole
-/// board does not get into the image so.
+/// board does not fit into the image.
 pub fn view(
     intrinsics: &Intrinsics,
     target: &TargetSpec,

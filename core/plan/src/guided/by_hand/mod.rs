@@ -1,15 +1,16 @@
 //! The same plan for a robot that is not driven by this program: hand-guided, by its pendant, or in a cell that cannot move
-//! it. Views are proposed as they look in the image, and a person brings them about.
+//! it. Views are proposed as they look in the image, and a person takes them.
 //!
 //! # How
 //! [`HandGuide`] proposes a view ([`Wanted`]); before there is an answer those of [`first_views`], from then on the one that
-//! lowers the expected error most ([`Guide`]). [`Wanted::judge`] compares the view that there is with it: what to change
-//! ([`Deviation`]), and whether it is good enough, which is also the case where it differs but says nearly as much.
+//! lowers the expected error most ([`Guide`]). [`Wanted::judge`] compares the present view with it: what to change
+//! ([`Deviation`]), and whether it is good enough, which is also the case where it differs but has nearly as much
+//! information.
 //!
 //! # Degenerate cases
-//! Whether the robot can get there is known only where its joints are recorded: then only poses that it reaches are proposed. Otherwise a
-//! person skips what cannot be reached. The robot has to say where it is; a
-//! session without robot poses has no hand-eye calibration.
+//! Whether the robot can get there is known only where its joints are recorded: then only poses that it reaches are proposed.
+//! Otherwise a person skips what cannot be reached. The robot has to report its pose; a session without robot poses has no hand-eye
+//! calibration.
 
 mod deviation;
 pub(crate) mod first_views;
@@ -28,10 +29,10 @@ use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::TargetSpec;
 use handeye_geometry::targets::observation::Corner;
 
-/// Part of the gain of the view that is wanted with which another view is as good.
+/// Part of the gain of the wanted view from which another view is good enough.
 const WORTH: f64 = 0.8;
 
-/// A first view that is turned by less against the one that there is says little: twice what a hand is off by.
+/// A first view that is turned by less against the present one gives little information: twice the error of a hand.
 const LEAST_FIRST_TURN_RAD: f64 = 16.0 * std::f64::consts::PI / 180.0;
 
 /// Proposes the views of one calibration.
@@ -39,14 +40,14 @@ const LEAST_FIRST_TURN_RAD: f64 = 16.0 * std::f64::consts::PI / 180.0;
 pub struct HandGuide {
     guide: Guide,
     first_views: usize,
-    /// Whether what was proposed last is one of the first views, of which the guide knows nothing.
+    /// Whether what was proposed last is one of the first views, which the guide does not know about.
     is_first: bool,
 }
 
-/// What comes next.
+/// The next step.
 #[derive(Debug, Clone)]
 pub enum HandNext {
-    /// A view to bring about.
+    /// A view to take.
     Take(Box<Wanted>),
     /// Nothing.
     End(Ending),
@@ -57,9 +58,9 @@ pub enum HandNext {
 pub struct Wanted {
     /// How the board looks there.
     pub camera_from_target: Pose<Camera, Target>,
-    /// Why; `None` for a first view and for a check.
+    /// Why it is proposed; `None` for a first view and for a check.
     pub why: Option<Why>,
-    /// Views that are expected to lead to the goal, this one first; `None` where nobody knows.
+    /// Views that are expected to lead to the goal, this one first; `None` where that is not known.
     pub views_left: Option<usize>,
     intrinsics: Intrinsics,
     target: TargetSpec,
@@ -71,30 +72,30 @@ pub struct Wanted {
 struct Worth {
     model: ViewModel,
     design: Design,
-    /// How the arm stands, where its joints are known.
+    /// The reach of the arm, where its joints are known.
     reach: Option<Reach>,
-    /// Error with the view that is wanted over that without it.
+    /// Error with the wanted view over that without it.
     ratio: f64,
 }
 
-/// How the view that there is compares with the one that is wanted.
+/// Comparison of the present view with the wanted one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Judged {
-    /// Where the board is, by the lens of the view that is wanted; `None` for corners that no pose explains.
+    /// Where the board is, by the lens of the wanted view; `None` for corners that no pose explains.
     pub present: Option<Pose<Camera, Target>>,
-    /// What differs; `None` where the board is not before the camera.
+    /// What differs; `None` where the board is not in front of the camera.
     pub deviation: Option<Deviation>,
     /// Whether a capture here is as good, with the whole board in the image.
     pub is_good: bool,
 }
 
 impl HandGuide {
-    /// Nothing is captured yet.
+    /// A guide without captures yet.
     pub fn new(options: GuidedOptions) -> Self {
         Self { guide: Guide::new(options), first_views: 0, is_first: false }
     }
 
-    /// Every view that was proposed from an answer, and what came of it.
+    /// Every view that was proposed from an answer, and its outcome.
     pub fn guide(&self) -> &Guide {
         &self.guide
     }
@@ -104,14 +105,14 @@ impl HandGuide {
         self.guide.work_in(tool_box);
     }
 
-    /// There is a view of what was proposed last.
+    /// A view of the last proposal was captured.
     pub fn captured(&mut self) {
         if !self.is_first {
             self.guide.captured();
         }
     }
 
-    /// A person leaves out what was proposed last.
+    /// A person skips the last proposal.
     pub fn skipped(&mut self) {
         if !self.is_first {
             self.guide.skipped();
@@ -119,7 +120,7 @@ impl HandGuide {
     }
 
     /// What to do next; `first` is how the board was seen at the first view, with the lens that is known or assumed.
-    /// [`Known::robot`] is not looked at. Long work polls `cancel`; cancelled it returns an end, which means nothing.
+    /// [`Known::robot`] is not used. Long work polls `cancel`; cancelled it returns an end, which is meaningless.
     pub fn next(
         &mut self,
         known: &Known<'_>,
@@ -148,7 +149,7 @@ impl HandGuide {
                 }))
             }
             Next::Go { why: Why::FirstTurns { .. } | Why::FirstTilts { .. }, .. } => {
-                // A turn of the tip says nothing to somebody who looks at the image, and is nowhere to be avoided.
+                // A turn of the tip is of no use to a person who looks at the image, and need not be avoided anywhere.
                 self.guide.steps.pop();
                 self.is_first = true;
                 while self.first_views < super::MOST_FAN {
@@ -199,21 +200,22 @@ impl HandGuide {
 }
 
 impl Wanted {
-    /// The lens by which it is to be drawn.
+    /// The lens with which it is to be drawn.
     pub fn intrinsics(&self) -> &Intrinsics {
         &self.intrinsics
     }
 
-    /// Compares with the view that there is, by the corners found in it and where the robot says that it is. A tenth of a
-    /// millisecond in a release build where the joints are not known (`guided_capture -- speed`), and one inverse kinematics more where they
-    /// are: it may be asked for every image.
+    /// Compares it with the present view, by the corners found in that and the reported pose of the robot. Takes a tenth of a
+    /// millisecond in a release build where the joints are not known (`guided_capture -- speed`), and one inverse kinematics more
+    /// where they are: it may be called for every image.
     pub fn judge(&self, corners: &[Corner], base_from_tip: &Pose<Base, Tip>) -> Judged {
-        // By the lens that the wanted view is drawn by: one that is wrong yet looks right is the same view.
+        // With the lens that the wanted view is drawn with: even if that is wrong, a view that looks right is the same
+        // view.
         let present = planar_pose::camera_from_target(corners, &self.target, &self.intrinsics).ok();
         let deviation = present
             .and_then(|present| Deviation::between(&self.intrinsics, &self.target, &present, &self.camera_from_target));
         let is_near = deviation.is_some_and(|deviation| deviation.is_near());
-        // One that is wanted at the edge of the image may be near and cut off.
+        // A view wanted at the edge of the image may be close and cut off.
         let is_whole = corners.len() == self.target.len();
         Judged { present, deviation, is_good: is_whole && (is_near || self.says_as_much(base_from_tip)) }
     }
@@ -223,7 +225,7 @@ impl Wanted {
         let Some(Worth { model, design, reach, ratio }) = &self.worth else { return false };
         let all: Vec<usize> = (0..self.target.len()).collect();
         let tip_from_joints = match reach.as_ref().map(|reach| reach.tip_from_joints(base_from_tip)) {
-            // What a view says depends on how the arm stands, and that is not known there.
+            // The information of a view depends on the posture of the arm, which is not known there.
             Some(None) => return false,
             Some(Some(tip_from_joints)) => tip_from_joints,
             None => Vec::new(),
@@ -236,7 +238,7 @@ impl Wanted {
     }
 }
 
-/// By the view alone: what it is judged by follows from it.
+/// Compares the view alone: the rest follows from it.
 impl PartialEq for Wanted {
     fn eq(&self, other: &Self) -> bool {
         self.camera_from_target == other.camera_from_target && self.why == other.why

@@ -25,7 +25,7 @@ fn a_trembling_hand_gets_to_ten_views_and_a_good_answer() {
             let (stated_m, true_m) = (stated_m.expect("stated"), true_m.expect("known"));
             // Ten designed views are at 0.1 mm by the same noise.
             assert!(stated_m < 4e-4, "{mode:?} {seed}: {stated_m} m");
-            // Three times a 95 % radius is never seen.
+            // Three times a 95 % radius never occurs.
             assert!(true_m < 3.0 * stated_m, "{mode:?} {seed}: {true_m} m off, {stated_m} m stated");
         }
     }
@@ -54,7 +54,7 @@ fn first_views_are_asked_for_by_how_they_look_and_what_is_skipped_does_not_come_
         assert!(wanted.camera_from_target.rotation().angle_to(&first.rotation()) > 0.27, "hardly another view");
     }
     assert!(one.camera_from_target.rotation().angle_to(&other.camera_from_target.rotation()) > 0.3);
-    // The view that there is, is not the one that is wanted; that one is.
+    // The present view is not the wanted one; the wanted view itself is.
     let judged = |pose: &Pose<Camera, Target>| {
         let corners = hand::corners(truth.intrinsics(), pose).expect("the whole board");
         one.judge(&corners, &at)
@@ -66,7 +66,7 @@ fn first_views_are_asked_for_by_how_they_look_and_what_is_skipped_does_not_come_
     assert!(guide.guide().steps().is_empty(), "no tip pose was proposed");
 }
 
-/// Whether the robot gets to a view is not known; where it has been it gets to again.
+/// Whether the robot reaches a view is not known; where it has been it gets again.
 #[test]
 fn views_that_are_skipped_lead_to_nearer_ones() {
     let mut cell = cell(Mode::EyeInHand, 5, false);
@@ -97,7 +97,7 @@ fn views_that_are_skipped_lead_to_nearer_ones() {
     assert!((0..4).map(|_| turn_deg(false)).fold(0.0, f64::max) > 16.0, "views that are taken make up for it");
 }
 
-/// Far from what was asked for, and worth as much.
+/// Far from the wanted view, and worth as much.
 #[test]
 fn another_view_that_says_as_much_is_as_good() {
     let mut cell = cell(Mode::EyeInHand, 4, false);
@@ -112,7 +112,7 @@ fn another_view_that_says_as_much_is_as_good() {
     };
     let there = truth.base_from_tip(&wanted.camera_from_target);
     assert!(wanted.says_as_much(&there));
-    // Where a view was taken already another one says little.
+    // Where a view was taken already another one adds little.
     let again = cell.observations.views[5].base_from_tip.expect("a robot");
     assert!(!wanted.says_as_much(&again));
 }
@@ -140,7 +140,7 @@ fn an_arm_whose_joints_are_recorded_is_planned_by_its_errors_though_nobody_drive
     assert!((from_m - promised.error_m).abs() < 1e-12, "{from_m} m, stated {promised:?}");
     assert!(to_m < from_m && to_m > promised.least_m, "{to_m} m of {from_m} m, {promised:?}");
     assert_eq!(part, Part::Arm, "the camera is known far better");
-    // What is asked for the arm gets to, and from there a view says as much, as from elsewhere not.
+    // The arm reaches the wanted pose, and a view from there has as much information, unlike one from elsewhere.
     let step = guide.guide().steps().last().expect("it was proposed");
     assert!(reach.tip_from_joints(&step.base_from_tip).is_some());
     let corners = hand::corners(wanted.intrinsics(), &wanted.camera_from_target).expect("the whole board");

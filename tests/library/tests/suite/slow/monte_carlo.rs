@@ -1,4 +1,5 @@
-//! A small version of the study in `examples/monte_carlo`: the bound is right, the estimate reaches it, its regions hold.
+//! A small version of the study in `examples/monte_carlo`: the bound is right, the estimate reaches it, its regions have
+//! the stated coverage.
 
 #[path = "../../../../studies/monte_carlo/answer.rs"]
 mod answer;

@@ -1,5 +1,5 @@
-//! A process that is killed while it works on a session: every change that it was told is recorded is there
-//! afterwards, with everything that can be undone and redone, and no copy is ever half there.
+//! A process that is killed while it works on a session: every change that was acknowledged is there afterwards, with
+//! everything that can be undone and redone, and no copy is ever incomplete.
 
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use image::{Rgb, RgbImage};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-/// Tells the test below that it is the process to be killed: the folder to work in, and the seed of what to do.
+/// Marks the process of the test below as the one to be killed: the folder to work in, and the seed of its actions.
 const VICTIM: &str = "HANDEYE_TEST_SESSION_VICTIM";
 const SEED: &str = "HANDEYE_TEST_SESSION_SEED";
 
@@ -24,7 +24,7 @@ const SEED: &str = "HANDEYE_TEST_SESSION_SEED";
 const THIS_TEST: &str = "slow::session_kill::a_kill_at_any_moment_loses_nothing_that_was_acknowledged";
 
 const SESSIONS: u64 = 50;
-/// How often the program that works on one session is killed. Each time it goes on where the one before ended.
+/// How often the program that works on one session is killed. Each time it continues where the previous one ended.
 const KILLS_PER_SESSION: u64 = 4;
 
 fn meta() -> SessionMeta {
@@ -55,7 +55,7 @@ fn base_from_tip(id: CaptureId) -> Pose<handeye_geometry::frames::Base, handeye_
     Pose::from_translation_xyzw([f64::from(id.0) / 3.0, 0.0, 0.0], [0.1, 0.2, 0.3, 0.9])
 }
 
-/// What the document says about a capture by [`act`].
+/// The document's record of a capture by [`act`].
 fn record(id: CaptureId) -> CaptureRecord {
     CaptureRecord {
         depth: Some(format!("depth/{id:04}.tiff")),
@@ -72,7 +72,7 @@ enum Action {
     SaveAs,
 }
 
-/// What is done next; the same for the same seed and the same history.
+/// The next action; the same for the same seed and the same history.
 fn choose(rng: &mut ChaCha8Rng, history: &History) -> Action {
     let captures = &history.document().captures;
     let mut some_capture = || captures.get(rng.random_range(0..captures.len().max(1)));
@@ -91,7 +91,7 @@ fn choose(rng: &mut ChaCha8Rng, history: &History) -> Action {
     }
 }
 
-/// What the action makes of the history; captures as [`act`] takes them.
+/// The effect of the action on the history; captures as [`act`] takes them.
 fn model(history: &mut History, action: &Action) {
     match action {
         Action::Capture => {
@@ -120,7 +120,7 @@ fn act(store: &mut Store, action: Action, copy: &Path) {
     }
 }
 
-/// Where the copy after so many actions of a run goes.
+/// Path of the copy after this many actions of a run.
 fn copy_path(folder: &Path, seed: u64, actions: usize) -> PathBuf {
     folder.with_file_name(format!("copy-{seed}-{actions}"))
 }
@@ -138,11 +138,11 @@ fn work_until_killed(folder: &Path, seed: u64) {
     }
 }
 
-/// What the kills met.
+/// What the kills hit.
 #[derive(Debug, Default)]
 struct Figures {
     kills: usize,
-    /// Kills before the session was there.
+    /// Kills before the session existed.
     before_the_session: usize,
     /// Calls that had returned.
     acknowledged: usize,
@@ -182,10 +182,10 @@ fn a_kill_at_any_moment_loses_nothing_that_was_acknowledged() {
     assert_eq!(figures.kills, 200);
 }
 
-/// Starts the victim, lets it get some way at random, kills it, and counts the calls that have returned.
+/// Starts the victim, lets it progress by a random amount, kills it, and counts the calls that have returned.
 fn run_and_kill(folder: &Path, seed: u64) -> usize {
     let mut rng = ChaCha8Rng::seed_from_u64(!seed);
-    // Now and then before the session is there.
+    // Now and then before the session exists.
     let wait_for = rng.random_range(0..10);
     let longer = Duration::from_micros(rng.random_range(0..8_000));
     let mut victim = Command::new(std::env::current_exe().expect("this program"))
@@ -210,7 +210,7 @@ fn run_and_kill(folder: &Path, seed: u64) -> usize {
     calls
 }
 
-/// Compares what is on the disk with what was acknowledged; `known` is the session before the run.
+/// Compares the disk with what was acknowledged; `known` is the session before the run.
 fn check(folder: &Path, seed: u64, calls: usize, known: History, figures: &mut Figures) -> History {
     figures.acknowledged += calls;
     if !Session::is_session(folder) {
@@ -218,7 +218,7 @@ fn check(folder: &Path, seed: u64, calls: usize, known: History, figures: &mut F
         figures.before_the_session += 1;
         return known;
     }
-    // The first line says that the session is open.
+    // The first line reports that the session is open.
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut acknowledged = known;
     for actions in 0..calls.saturating_sub(1) {
@@ -261,7 +261,7 @@ fn check(folder: &Path, seed: u64, calls: usize, known: History, figures: &mut F
     found
 }
 
-/// A copy under its goal's name is whole.
+/// A copy under its final name is complete.
 fn check_copy(copy: &Path, expected: &History, figures: &mut Figures) {
     figures.copies += 1;
     let store = Store::open(copy).unwrap_or_else(|e| panic!("{e}"));

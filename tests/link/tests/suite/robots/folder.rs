@@ -21,7 +21,7 @@ fn start(python: &Path, folder: &Path, more: &[&str]) -> Talk {
     Talk::run(python, "folder.py", &[&[folder, "--hold", "0"], words.as_slice(), more].concat())
 }
 
-/// An image that is of one grey everywhere, as a file.
+/// An image of a single grey level, as a file.
 fn image(grey: u8, format: ImageFormat) -> Vec<u8> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     RgbImage::from_pixel(8, 6, Rgb([grey; 3])).write_to(&mut bytes, format).expect("an image");
@@ -73,7 +73,7 @@ fn an_image_is_shown_with_its_pose_once_both_are_whole() {
     let (image_message, got) = talk.image(None, false);
     assert_eq!((image_message.width, image_message.height, image_message.encoding), (8, 6, ImageEncoding::Png));
     assert_eq!(got, bytes);
-    // The pose at the instant of the image is the one that belongs to it, on both sides of it.
+    // The pose at the instant of the image is the one that belongs to it, before and after it.
     let after = talk.state();
     assert!(after.stamp >= image_message.stamp && after.moving == Some(false));
     talk.bye();
@@ -155,7 +155,7 @@ fn images_alone_are_a_camera() {
     let mut talk = Talk::run(&python, "folder.py", &[folder.path().to_str().expect("letters"), "--images-only"]);
     assert_eq!(talk.hello().can, [Ability::Image]);
     let (first, _) = talk.image(None, false);
-    // As a camera that looks at what stands still: there is always a newer image.
+    // As with a camera that looks at a static scene: there is always a newer image.
     let (second, _) = talk.image(Some(first.stamp), false);
     assert!(second.stamp > first.stamp);
     talk.bye();

@@ -1,4 +1,4 @@
-//! The drivers that come with the workbench, through the protocol, in front of servers that are written from the makers' guides.
+//! The drivers that come with the workbench, through the protocol, against servers written from the makers' guides.
 
 mod folder;
 mod rosbridge;
@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 use handeye_driver::message::{FromDriver, Hello, ImageMessage, StateMessage, ToDriver};
 
-/// Long enough for a busy machine; a test that waits so long has failed.
+/// Long enough for a busy machine; a test that waits this long has failed.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// The file of a driver that comes with the program.
@@ -32,14 +32,14 @@ struct Talk {
 }
 
 impl Talk {
-    /// Runs a file of `assets/drivers` and says `hello`.
+    /// Runs a file of `assets/drivers` and sends `hello`.
     fn run(python: &Path, file: &str, options: &[&str]) -> Self {
         let mut command = Command::new(python);
         command.arg(driver_file(file)).args(options);
         Self::with(command)
     }
 
-    /// Starts a driver and says `hello`.
+    /// Starts a driver and sends `hello`.
     fn with(mut command: Command) -> Self {
         let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("python runs");
         let (input, output) = (child.stdin.take().expect("a pipe"), child.stdout.take().expect("a pipe"));
@@ -61,7 +61,7 @@ impl Talk {
         self.input.write_all(message.line().as_bytes()).expect("the driver reads");
     }
 
-    /// The next message that `pick` takes; others are passed over.
+    /// The next message that `pick` accepts; others are skipped.
     fn wait<T>(&mut self, mut pick: impl FnMut(FromDriver, Vec<u8>) -> Option<T>) -> T {
         let deadline = Instant::now() + PATIENCE;
         loop {
@@ -117,7 +117,7 @@ impl Talk {
     }
 }
 
-/// One message and the bytes behind it; `None` at the end.
+/// One message and the bytes after it; `None` at the end.
 fn read(output: &mut BufReader<ChildStdout>) -> Option<(FromDriver, Vec<u8>)> {
     let mut line = String::new();
     if output.read_line(&mut line).expect("lines of text") == 0 {

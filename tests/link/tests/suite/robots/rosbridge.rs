@@ -1,4 +1,4 @@
-//! `handeye driver rosbridge` in front of a rosbridge that is written from its protocol's specification.
+//! `handeye driver rosbridge` against a rosbridge written from its protocol's specification.
 
 use std::path::Path;
 use std::time::Duration;
@@ -104,7 +104,7 @@ fn what_is_missing_is_named_with_the_topics_and_frames_that_there_are() {
         ),
         (&[&FRAMES, &JOINTS[..2]], &["elbow_joint,shoulder_pan_joint", "--joint-names"]),
     ];
-    // Each waits some seconds, so together.
+    // Each waits some seconds, so they run together.
     let Some(python) = python() else { return };
     let server = server(RosScene::new(RosVersion::Two));
     let running: Vec<_> =

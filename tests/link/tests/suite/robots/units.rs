@@ -1,4 +1,4 @@
-//! The parts of the drivers that need no server, tested where they are written: in Python.
+//! The parts of the drivers that need no server, tested in Python.
 
 use std::path::Path;
 use std::process::Command;

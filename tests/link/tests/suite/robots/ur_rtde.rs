@@ -1,4 +1,4 @@
-//! `handeye driver ur-rtde` in front of a controller that is written from the maker's guide.
+//! `handeye driver ur-rtde` against a controller written from the maker's guide.
 
 use std::path::Path;
 
@@ -26,7 +26,7 @@ fn vector(name: &str) -> [f64; 6] {
     }
 }
 
-/// What the controller writes as `x y z rx ry rz`, as a message of the driver has it.
+/// The controller's `x y z rx ry rz`, as in a message of the driver.
 fn assert_is_pose(message: &handeye_driver::message::PoseMessage, expected: [f64; 6]) {
     let [x, y, z, rx, ry, rz] = expected;
     assert_eq!(message.translation_m, [x, y, z]);
@@ -73,7 +73,8 @@ fn a_pong_shows_the_clock_of_the_controller() {
     });
     let after = talk.state().stamp;
     assert_eq!(pong.id, 9);
-    // It is not before a state that was sent before the ping; what follows it took its way and one period at most.
+    // It is not before a state that was sent before the ping; what follows it is delayed by the transfer and at most
+    // one period.
     assert!(pong.stamp >= before - 0.001 && pong.stamp <= after + 5.0, "{before} {} {after}", pong.stamp);
     talk.bye();
 }

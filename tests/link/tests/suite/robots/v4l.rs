@@ -1,4 +1,4 @@
-//! `handeye driver v4l` with a module in the place of OpenCV, which has a webcam: no camera is needed.
+//! `handeye driver v4l` with a module that replaces OpenCV and provides a webcam: no camera is needed.
 
 use std::path::Path;
 use std::process::Command;
@@ -31,7 +31,7 @@ fn the_format_that_loses_least_is_read_in_its_largest_size_and_jpeg_where_the_si
         assert_eq!(hello.can, [Ability::Image]);
         let (image, bytes) = talk.image(None, false);
         assert_eq!((image.width, image.height, image.encoding, bytes.len()), (width, height, encoding, length));
-        // The kernel's stamp, of a camera that takes 25 images a second.
+        // The kernel's stamp, for a camera with 25 images per second.
         assert!((image.stamp_uncertainty_s - 0.06).abs() < 1e-9, "{image:?}");
         let (next, _) = talk.image(Some(image.stamp), false);
         assert!(next.stamp > image.stamp);

@@ -95,7 +95,8 @@ impl Seen {
         now
     }
 
-    /// That every pass was seen, that no limit was exceeded from one to the next, and that the arm stands in the end.
+    /// That every pass was seen, that no limit was exceeded from one to the next, and that the arm is at rest in the
+    /// end.
     fn check(&self, kinematics: &ArmKinematics, limits: &FollowLimits, what: &str) {
         let near = |value: f64, limit: f64| value <= limit * 1.00001 + 1e-6;
         let largest = |q: JointValues| q.iter().fold(0.0, |most: f64, q| most.max(q.abs()));
@@ -142,7 +143,7 @@ fn the_tip_moves_along_with_a_goal_on_a_circle() {
         if after_s > 11.0 { FollowRequest::End } else { FollowRequest::Towards(circle(moment.sim_time_s)) }
     });
     assert_eq!(end, Ok(FollowEnd::Released));
-    // Samples of the last second are those in which it had been let go.
+    // Samples of the last second are after the release.
     let followed = &lags_mm[..200.min(lags_mm.len())];
     let rms_mm = (followed.iter().map(|lag| lag * lag).sum::<f64>() / followed.len() as f64).sqrt();
     let worst_mm = followed.iter().copied().fold(0.0, f64::max);
@@ -191,7 +192,7 @@ fn whenever_the_goal_is_taken_away_or_stop_is_pressed_the_arm_comes_to_rest_with
             }
             since_taken += 1;
             match taken {
-                // It rests for some passes, moves again, rests for good.
+                // It rests for some passes, moves again, and then rests finally.
                 Taken::Rest if since_taken <= again || (2 * again..2 * again + 15).contains(&since_taken) => {
                     FollowRequest::Rest
                 }
@@ -343,7 +344,7 @@ fn following_ends_when_the_simulation_does() {
 
 #[test]
 fn a_client_that_misses_passes_takes_no_larger_steps() {
-    // Passes follow each other as fast as they can, and this caller takes its time.
+    // Passes follow each other as fast as they can, and this caller is slow.
     let mut bench = Bench::running();
     let mut other = connect(&bench.server);
     let start = bench.tip();
@@ -382,7 +383,7 @@ fn a_client_that_dies_leaves_a_standing_arm() {
             passes += 1;
             if passes > 12 {
                 died.send(()).expect("the test waits");
-                // Its sockets are closed as the thread unwinds, without a word to the server.
+                // Its sockets are closed as the thread unwinds, without a message to the server.
                 std::panic::resume_unwind(Box::new("this client dies"));
             }
             FollowRequest::Towards(goal)

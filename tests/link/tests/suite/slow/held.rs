@@ -8,7 +8,7 @@ use handeye_coppeliasim::cell::{Arm, ArmJog, CellClient, CellPaths, SettleOption
 use handeye_coppeliasim::{CallOptions, CancelToken, ConnectionOptions, Endpoint, LinkError, MotionLimits, Sim};
 use handeye_server::{CellConfig, CellServer};
 
-/// It is 3 s; the rest is for a machine that has other things to do. A call may take 60 s.
+/// It is 3 s; the rest is for a busy machine. A call may take 60 s.
 const SOON: Duration = Duration::from_secs(10);
 
 fn is_held_soon<T: std::fmt::Debug>(what: &str, work: impl FnOnce() -> Result<T, LinkError>) {
@@ -39,13 +39,13 @@ fn a_client_in_stepping_mode_that_does_not_step_is_named_within_seconds_and_work
     let (start, limits, cancel) = (frame.joints, MotionLimits::uniform(6, 1.0, 4.0, 40.0), CancelToken::default());
     let goal = start.map(|angle| angle + 0.1);
 
-    // What waits for one says why it does not come.
+    // What waits for a pass reports why it does not come.
     is_held_soon("a motion", || arm.move_to_joints(&goal, &limits, &cancel));
     let jog = ArmJog::Joint { index: 0, forward: true };
     is_held_soon("a jog", || arm.jog(&jog, Some(0.1), &mut || Some(1.0)));
     is_held_soon("waiting for the arm", || arm.settle(&SettleOptions::default(), &cancel));
 
-    // A call that only takes long is left alone, although the server asks to wait all along.
+    // A call that merely takes long is left alone, although the server asks to wait all along.
     let longer_s = SOON.as_secs_f64() / 2.0;
     let waited = arm.sim().connection().call("sim.wait", vec![Value::Float(longer_s), Value::from(false)]);
     waited.expect("a call that takes long");

@@ -1,4 +1,4 @@
-//! A stop at any instant of any motion leaves an arm that can be moved on, whatever moves its joints.
+//! A stop at any instant of any motion leaves an arm that can be moved again, whatever moves its joints.
 
 use handeye_cell::scene::{JointModeSpec, Scene};
 use handeye_coppeliasim::cell::{
@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex};
 
 use crate::arm::watched;
 
-/// What ends the motion under way, so many passes from now.
+/// What ends the motion under way, this many passes from now.
 type Trigger = Arc<Mutex<Option<(u32, CancelToken)>>>;
 
 fn cell_with_trigger(server: &CellServer) -> (CellClient, Trigger) {

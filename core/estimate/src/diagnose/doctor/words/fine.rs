@@ -14,12 +14,12 @@ use crate::handeye::Mode;
 use handeye_wording::text;
 use handeye_wording::{Text, shown};
 
-/// A turn from which a view is likelier seen the wrong way round than moved, degrees: views numbered from the wrong end are off
-/// by half a turn or a quarter, and a board that is knocked turns by less. It chooses the words only.
+/// Turn from which a view was more likely numbered the wrong way round than moved, degrees: views numbered from the wrong end
+/// are off by half a turn or a quarter, and a board that is knocked turns by less. It chooses the words only.
 const TURNED_DEG: f64 = 20.0;
 
-/// Every hypothesis: those taken in, then the best of every other kind. Views that were left out as outliers one after the other are
-/// one hypothesis.
+/// Every hypothesis: those taken in, then the best of every other kind. Views that were left out as outliers one after the other
+/// are one hypothesis.
 pub(in super::super) fn fine(selection: &Selection<'_>) -> Vec<Hypothesis> {
     let mut found: Vec<Hypothesis> = Vec::new();
     let views: Vec<usize> = selection
@@ -185,7 +185,7 @@ fn of_views(selection: &Selection<'_>, judged: &Judged, views: &[usize]) -> Hypo
     let model = &selection.model;
     let names: Vec<String> = views.iter().map(|i| model.sight.views[*i].name.clone()).collect();
     let mut numbers = common(judged);
-    // The view that is out by most; its displacement is by the fit without those left out as an outlier.
+    // The view that is off by most; its displacement is by the fit without those left out as an outlier.
     let size = |i: &usize| model.displacement_m(&selection.fit.residuals[*i]);
     let worst = views.iter().copied().max_by(|a, b| size(a).total_cmp(&size(b)));
     let mm = worst.map_or(0.0, |i| size(&i) * 1e3);
@@ -228,7 +228,7 @@ fn twist_size(numbers: &[f64]) -> (f64, f64) {
     (norm(&numbers[..split]) * 1e3, norm(&numbers[split..]).to_degrees())
 }
 
-/// What every hypothesis has to say for itself.
+/// Evidence that every hypothesis has.
 fn common(judged: &Judged) -> Vec<Evidence> {
     let [(without_m, with_m), (without_rad, with_rad)] = judged.robot;
     let mut numbers = vec![

@@ -6,7 +6,7 @@ use handeye_geometry::camera::Intrinsics;
 use handeye_wording::Text;
 use handeye_wording::text;
 
-/// What is wrong and what to do, where the centre would go by `off` \[px\], which is `half` a pixel.
+/// What is wrong and what to do, where the centre would move by `off` \[px\]; `half` if that is half a pixel.
 pub fn centre(given: Option<Intrinsics>, off: [f64; 2], sigma: [f64; 2], half: Option<Vector2<f64>>) -> (Text, Text) {
     let what = text!(
         "The centre of the lens given does not fit the images: cx would be {x} ± {x_sigma} px off and cy {y} ± {y_sigma} px.",

@@ -17,14 +17,14 @@ use handeye_wording::text;
 use handeye_wording::{Text, shown};
 
 /// Natural logarithm of a likelihood ratio that a gross hypothesis needs after allowance for all that are tried. Of two fixed
-/// laws the wrong one is so much likelier in seven sessions in a thousand at the most (Markov's inequality).
+/// distributions the wrong one is this much likelier in at most seven sessions in a thousand (Markov's inequality).
 pub(super) const CERTAIN: f64 = 5.0;
-/// One distance speaks for a set-up when it is so many times the other. It adds a sentence; nothing is decided by it.
+/// One distance supports a set-up when it is this many times the other. It adds a sentence; nothing is decided by it.
 const FARTHER: f64 = 2.0;
 
 /// How many times better, from the logarithm.
 fn times(gain: f64) -> String {
-    // Beyond a few thousand times the size of the number tells nothing.
+    // Beyond a few thousand times the size of the number means nothing.
     if gain < 8.0 { format!("{:.1}", gain.exp()) } else { format!("e^{gain:.0}") }
 }
 
@@ -102,7 +102,7 @@ pub(super) fn gross(sight: &SessionViews, gross: &Gross) -> Vec<Hypothesis> {
             found.push(hypothesis);
             continue;
         };
-        // Of poses that were measured elsewhere nobody has seen that they are camera_from_target.
+        // For poses measured elsewhere nothing confirms that they are camera_from_target.
         let (first, also) = if sight.intrinsics.is_none() {
             (FindingCode::InvertedTargetPoses, vec![FindingCode::WrongMode])
         } else {
@@ -111,7 +111,7 @@ pub(super) fn gross(sight: &SessionViews, gross: &Gross) -> Vec<Hypothesis> {
         let with = std::iter::once(FindingCode::InvertedPoses).chain(also.iter().copied()).collect();
         let mut other = Hypothesis { code: first, with, ..hypothesis.clone() };
         hypothesis.with = std::iter::once(first).chain(also).collect();
-        // One finding for both: the likelier.
+        // One finding for both: the likelier one.
         if camera_elsewhere {
             hypothesis.accepted = false;
             found.extend([other, hypothesis]);
@@ -123,8 +123,8 @@ pub(super) fn gross(sight: &SessionViews, gross: &Gross) -> Vec<Hypothesis> {
     found
 }
 
-/// Inverted poses and the other set-up are the same equations. Whether the distances speak for the other set-up: what
-/// is carried by the tip is nearer to it than what stands in the cell.
+/// Inverted poses and the other set-up are the same equations. Whether the distances support the other set-up: what is
+/// carried by the tip is nearer to it than what is fixed in the cell.
 fn twin(sight: &SessionViews, tried: &Tried) -> Option<bool> {
     let (camera_m, target_m) = distances(tried);
     let stands_elsewhere = match sight.mode {
@@ -140,7 +140,7 @@ fn distances(tried: &Tried) -> (f64, f64) {
 }
 
 fn gross_hypothesis(sight: &SessionViews, gross: &Gross, tried: &Tried, codes: &[FindingCode]) -> Hypothesis {
-    // Where the poses as they are have no solution at all, the board is as good as nowhere.
+    // Where the poses as given have no solution at all, the place of the board is undetermined.
     let given_m = gross.as_given.as_ref().map_or(sight.target.distance_m, |a| a.median_m);
     let so_m = tried.agreement.median_m;
     let (given_mm, so_mm) = (given_m * 1e3, so_m * 1e3);

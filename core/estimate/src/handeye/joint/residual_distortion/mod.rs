@@ -1,8 +1,8 @@
-//! Whether the data show that the lens does more than its model, and what that does to the answer.
+//! Whether the data show a residual distortion of the lens beyond its model, and the effect of that on the answer.
 //!
 //! The [field](ResidualDistortion) is an effect as in [`super::effects`]. The degree of the polynomials and the standard
-//! deviation of its coefficients are those that gain most. Corners with the field `(S + s⁻²)⁻¹ h` taken off are estimated
-//! again until it stands still; the covariance of the answer has that of the coefficients added.
+//! deviation of its coefficients are those that gain most. Corners with the field `(S + s⁻²)⁻¹ h` subtracted are
+//! estimated again until it converges; the covariance of the answer has that of the coefficients added.
 //!
 //! Source: Henderson 1975, "Best linear unbiased estimation and prediction under a selection model"; Patterson & Thompson
 //! 1971 (restricted likelihood). `docs/maths/residual_distortion.md`.
@@ -22,19 +22,19 @@ use handeye_geometry::targets::observation::{Corner, View};
 /// corners of a usual board are too far apart to see one.
 pub const DEGREES: [usize; 3] = [3, 5, 8];
 /// Gain of twice the log-likelihood from which the field is taken into the model: by chance at most one session in a
-/// hundred. Its level is at the edge of what it can be, so half of all healthy sessions gain nothing and the rest follows
+/// hundred. Its level is at the edge of its range, so half of all healthy sessions gain nothing and the rest follows
 /// chi-square with one degree of freedom (Self & Liang 1987); three degrees are tried.
 const GAIN: f64 = 7.36;
 /// Standard deviations of a coefficient that are tried, pixels.
 const LEVELS_PX: std::ops::Range<f64> = 1e-4..1.0;
-/// Rounds of field and fit at the most.
+/// Most rounds of field and fit.
 const MAX_ROUNDS: usize = 8;
-/// Square of the way of the field in a round, in its standard deviations, below which it stands still.
+/// Squared change of the field in a round, in its standard deviations, below which it has converged.
 const STILL: f64 = 1e-2;
-/// The same in the last round: what goes to and fro within its own uncertainty is counted by that.
+/// The same in the last round: an oscillation within the uncertainty is covered by it.
 const AT_LAST: f64 = 1.0;
 
-/// A field that the data show, with what its estimate rests on.
+/// A field that the data show, with the basis of its estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShownDistortion {
     /// The field itself.
@@ -45,18 +45,18 @@ pub struct ShownDistortion {
     pub rms_px: f64,
     /// Gain of twice the log-likelihood over the lens model alone.
     pub gain: f64,
-    /// Part of the residuals that is left once the numbers that the field takes up are off.
+    /// Part of the residuals that is left after subtracting the degrees of freedom of the field.
     pub used_up: f64,
 }
 
-/// The views with a field taken off their corners.
+/// The views with a field subtracted from their corners.
 pub fn corrected(views: &[View], field: &ResidualDistortion) -> Vec<View> {
     let corrected = |corner: &Corner| Corner { px: corner.px - field.at(&corner.px), ..*corner };
     views.iter().map(|view| View { corners: view.corners.iter().map(corrected).collect(), ..view.clone() }).collect()
 }
 
-/// The estimate with the residual distortion that the views of a problem show; `without` is that without it. `None` also when
-/// the lens is given.
+/// The estimate with the residual distortion that the views of a problem show; `without` is the estimate without it. `None`
+/// also when the lens is given.
 ///
 /// # Errors
 /// [`HandEyeError::Cancelled`].
@@ -73,7 +73,7 @@ pub fn with_shown_distortion(
     let Some(all) = Equations::new(problem, without, Effect::Distortion(most), cancel)? else { return Ok(None) };
     let mut last = None;
     let shown = settled(&without.intrinsics, &all, views, |field, degree| {
-        // That of the round before is not needed any more, and is large where views are many.
+        // The estimate of the round before is not needed any more, and is large where views are many.
         last = None;
         let corrected = corrected(views, field);
         let problem = JointProblem { views: &corrected, ..*problem };
@@ -85,7 +85,7 @@ pub fn with_shown_distortion(
     Ok(shown.zip(last))
 }
 
-/// What a field gains beside an estimate without, of twice the log-likelihood, before it is settled; zero where none is shown.
+/// Gain of twice the log-likelihood by a field over an estimate without one, before convergence; zero where none is shown.
 ///
 /// # Errors
 /// [`HandEyeError::Cancelled`].
@@ -106,8 +106,8 @@ fn most_likely(all: &Equations) -> Option<(usize, MostLikely)> {
 }
 
 /// Rounds of field and fit, from the equations `all` of an optimum without a field. `fit` makes a new optimum of the corners
-/// with a field of some degree taken off. `None` where the data show none, or none that settles; else the last fit goes with
-/// the field that is returned.
+/// with a field of some degree subtracted. `None` where the data show none, or none that converges; otherwise the last fit
+/// is that with the returned field.
 pub fn settled<'v, E>(
     intrinsics: &Intrinsics,
     all: &Equations,
@@ -141,7 +141,7 @@ fn rms<'v>(views: impl IntoIterator<Item = &'v View>, field: &ResidualDistortion
     (sum / count.max(1) as f64).sqrt()
 }
 
-/// A solution of corners with a field taken off, with the field's uncertainty in its covariance.
+/// A solution of corners with a field subtracted, with the field's uncertainty in its covariance.
 ///
 /// # Errors
 /// [`HandEyeError::Cancelled`]; [`HandEyeError::NoSolution`] when the solution is not one of the problem.

@@ -1,8 +1,8 @@
 //! One residual distortion for several sessions of one camera.
 //!
-//! At the optimum of all sessions with one lens `ℓ`, session `j` with all but `ℓ` and the coefficients `c` eliminated says
-//! `I_j` of both. The sum of these over the sessions, with `ℓ` eliminated, are the equations of `c`. The unknowns of session
-//! `i` follow `c` by themselves, and through the lens that the others move.
+//! At the optimum of all sessions with one lens `ℓ`, session `j` with all but `ℓ` and the coefficients `c` eliminated has
+//! the information `I_j` on both. The sum of these over the sessions, with `ℓ` eliminated, are the equations of `c`. The
+//! unknowns of session `i` follow `c` directly, and through the lens that the others move.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -15,22 +15,22 @@ use crate::handeye::joint::view_block::Layout;
 use crate::handeye::joint::{JointProblem, JointSolution};
 use handeye_geometry::progress::CancelToken;
 
-/// What one session says of the coefficients.
+/// The information of one session on the coefficients.
 pub struct Share {
-    /// With the lens eliminated, and what the others say of it in place.
+    /// Equations with the lens eliminated, given the information of the others on it.
     own: Equations,
-    /// Between lens and coefficients.
+    /// Block between lens and coefficients.
     cross: DMatrix<f64>,
-    /// Of the coefficients with the lens as it is.
+    /// Information on the coefficients with the lens held.
     information: DMatrix<f64>,
-    /// How the unknowns of the session follow a pull at the lens.
+    /// How the unknowns of the session respond to a gradient at the lens.
     by_lens: DMatrix<f64>,
-    /// What its variances have to be multiplied by.
+    /// Factor by which its variances have to be multiplied.
     factor: f64,
 }
 
 impl Share {
-    /// Of a session's solution with the lens of all; `None` where it says nothing.
+    /// Share of a session's solution with the lens of all; `None` where it has no information.
     ///
     /// # Errors
     /// [`HandEyeError::Cancelled`], and [`HandEyeError::NoSolution`] when the solution is not one of the problem.
@@ -53,7 +53,8 @@ impl Share {
     }
 }
 
-/// The equations of the coefficients by all sessions, whose lens is known to `lens`; `None` where that leaves a direction open.
+/// The equations of the coefficients by all sessions, whose lens is known as well as `lens`; `None` where that leaves a
+/// direction open.
 pub fn together(shares: &[Share], lens: &LensEstimate) -> Option<Equations> {
     let first = shares.first()?;
     let k = first.information.nrows();

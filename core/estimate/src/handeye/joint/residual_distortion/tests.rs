@@ -5,7 +5,7 @@ use crate::test_sessions::Estimated as _;
 use handeye_geometry::se3;
 use handeye_simulate::session::{REALISTIC, Session, camera, trial};
 
-/// A session of a lens that is of its model but for waves of so many pixels.
+/// A session of a lens that follows its model except for waves of this many pixels.
 fn session(views: usize, waves_px: f64, seed: u64) -> Session {
     let mut session = trial(Mode::EyeInHand, views, &REALISTIC, camera(), seed);
     session.add_waves(waves_px, 300.0);
@@ -41,13 +41,13 @@ fn a_lens_beyond_its_model_is_seen_and_what_it_does_to_the_answer_is_counted() {
         let solution = with_stated_error(&problem, solution, &cancel).expect("solves");
         let solution = with_its_error(&problem, solution, &distortion, &cancel).expect("solves");
         mahalanobis += distance(&session, &solution);
-        // 5,600 residuals tell the noise to one percent.
+        // 5,600 residuals determine the noise to one percent.
         assert!((solution.noise.corner_px / 0.1 - 1.0).abs() < 0.05, "{:?}", solution.noise);
     }
     let (mean, plain) = (mahalanobis / found as f64, plain / trials as f64);
     println!("seen in {found} of {trials}, mean squared Mahalanobis distance {mean:.2} of 6, without {plain:.1}");
     assert_eq!(found, trials);
-    // Of a true covariance it is 6 or less; 20 of them scatter by sqrt(12 / 20) = 0.8. The waves are the same in all.
+    // With a true covariance it is 6 or less; 20 of them scatter by sqrt(12 / 20) = 0.8. The waves are the same in all.
     assert!(mean < 8.5, "{mean}");
     assert!(plain > 12.0, "{plain}");
 }
@@ -97,11 +97,11 @@ fn the_answer_follows_a_small_field_as_the_equations_say() {
         let moved = |solution: &JointSolution| solution.hand_eye.mount_from_camera();
         let moved = se3::log((moved(&before).inverse() * moved(&after)).isometry());
         let expected: nalgebra::Vector6<f64> = -(&equations.follow * &coefficients).fixed_rows::<6>(0);
-        // In standard deviations: what the lens takes up leaves a way of second order.
+        // In standard deviations: what the lens absorbs leaves a change of second order.
         let length = |way: nalgebra::Vector6<f64>| way.dot(&(information * way)).sqrt();
         let (off, far) = (length(moved - expected), length(expected));
         assert!(off < 0.02 * far + 1e-3, "{k}: off by {off} of {far} standard deviations");
-        // The cost falls by as much as the pull and the information say.
+        // The cost falls by as much as follows from the gradient and the information.
         let half =
             coefficients.dot(&(&equations.information * &coefficients)) - 2.0 * coefficients.dot(&equations.pull);
         let cost = |solution: &JointSolution, views: &[View]| {

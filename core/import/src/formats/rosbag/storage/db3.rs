@@ -13,11 +13,11 @@ use handeye_wording::foreign;
 
 pub(super) fn visit(file: &Path, each: &mut Each<'_>) -> Result<(), Text> {
     let mut open = || -> rusqlite::Result<()> {
-        // Whoever records still holds its journal: nothing beside the file is made.
+        // A recorder that is still running holds its journal: no other file is created.
         let bag =
             Connection::open_with_flags(file, OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
         bag.set_limit(rusqlite::limits::Limit::SQLITE_LIMIT_LENGTH, MOST_RECORD_BYTES as i32)?;
-        // A view is a program, which need not end. Of tables the next row is read when it is asked for.
+        // A view is a program, which need not end. Rows of tables are read one by one.
         bag.set_db_config(DbConfig::SQLITE_DBCONFIG_ENABLE_VIEW, false)?;
         bag.set_db_config(DbConfig::SQLITE_DBCONFIG_TRUSTED_SCHEMA, false)?;
         let mut topics = bag.prepare("SELECT id, name, type, serialization_format FROM topics")?;

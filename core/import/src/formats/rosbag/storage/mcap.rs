@@ -1,7 +1,7 @@
 //! Bags in MCAP, of ROS 2 or of ROS 1.
 //!
-//! Chunks are unpacked here and not by the crate that reads the rest: it waits for ever for the end of one that says that it is
-//! longer than it is.
+//! Chunks are unpacked here and not by the crate that reads the rest: it waits forever for the end of a chunk that states more
+//! bytes than it has.
 
 use std::collections::BTreeMap;
 use std::fs::File;

@@ -1,5 +1,5 @@
-//! The messages of a bag, one after the other, from every kind of its files. What a file says of its own lengths is bounded
-//! before anything is allocated, and so is what comes out of what is compressed.
+//! The messages of a bag, one after the other, from every kind of its files. Lengths that a file states are bounded before
+//! anything is allocated, and so is the output of decompression.
 
 mod db3;
 mod mcap;
@@ -31,17 +31,17 @@ pub(super) struct Message<'a> {
 }
 
 impl<'a> Message<'a> {
-    /// Reads its fields; `None` where it is not encoded as it has to be.
+    /// Reads its fields; `None` for an invalid encoding.
     pub fn reader(&self) -> Option<Reader<'a>> {
         Reader::new(self.encoding, self.data)
     }
 }
 
-/// Calls with every message of a file, by the ending of its name, and ends when it is told to. A file that breaks off has what
-/// came before.
+/// Calls `each` with every message of a file, by the ending of its name, and ends when it returns a break. A truncated file
+/// has the messages before its end.
 ///
 /// # Errors
-/// A sentence, where it is no bag or the budget is spent.
+/// A sentence, where it is not a bag or the budget is spent.
 pub(super) fn visit(file: &Path, budget: &Budget<'_>, each: &mut dyn FnMut(Message)) -> Result<(), Text> {
     let ends = |with: &str| file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(with));
     let mut each = |message: Message| {
@@ -58,13 +58,13 @@ pub(super) fn visit(file: &Path, budget: &Budget<'_>, each: &mut dyn FnMut(Messa
     Ok(budget.check()?)
 }
 
-/// Whether more messages are wanted.
+/// Whether to go on with further messages.
 type Flow = ControlFlow<()>;
 
-/// What every kind of file calls with its messages.
+/// The callback for the messages of any kind of file.
 type Each<'a> = dyn FnMut(Message) -> Flow + 'a;
 
-/// Reads at the most so many bytes; `None` of more, or of what cannot be read.
+/// Reads at most `most` bytes; `None` for more, or on a read error.
 fn bounded(input: impl Read, most: usize) -> Option<Vec<u8>> {
     let mut data = Vec::new();
     let read = input.take(most as u64 + 1).read_to_end(&mut data).ok()?;
@@ -81,7 +81,7 @@ struct Channel {
 impl Channel {
     fn new(topic: String, kind: String, encoding: Encoding) -> Self {
         let kind = match (encoding, kind.as_str()) {
-            // What tf2 has replaced, with the same fields.
+            // The type that tf2 has replaced, with the same fields.
             (Encoding::Ros1, "tf/tfMessage") => "tf2_msgs/msg/TFMessage".to_owned(),
             (Encoding::Ros1, kind) if !kind.contains("/msg/") => kind.replacen('/', "/msg/", 1),
             _ => kind,

@@ -1,7 +1,7 @@
 //! Bags of ROS 1, version 2.0: <http://wiki.ros.org/Bags/Format/2.0>. Read from front to back without the index at their end,
 //! so that one whose recorder was killed is read too.
 //!
-//! The crate `rosbag` was looked at: it maps the file into memory and allocates as much as a chunk says it has.
+//! The crate `rosbag` was not used: it maps the file into memory and allocates as much as a chunk states.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -19,7 +19,7 @@ use handeye_wording::text;
 const MAGIC: &[u8; 13] = b"#ROSBAG V2.0\n";
 /// Longest header of a record: names of a topic and a type.
 const MOST_HEADER_BYTES: u32 = 1 << 20;
-/// Most topics that are told apart.
+/// Most topics that are distinguished.
 const MOST_CHANNELS: usize = 10_000;
 
 const MESSAGE: u8 = 2;
@@ -38,7 +38,7 @@ pub(super) fn visit(file: &Path, each: &mut Each<'_>) -> Result<(), Text> {
         });
     }
     let mut bag = Bag { channels: BTreeMap::new(), each, is_over: false };
-    // What is behind a record that cannot be read is not known to be one.
+    // After a record that cannot be read the next one cannot be found.
     let _end = bag.records(&mut input, false);
     Ok(())
 }
@@ -51,7 +51,7 @@ struct Bag<'a> {
 }
 
 impl Bag<'_> {
-    /// Reads records up to the end, or to one that is none.
+    /// Reads records up to the end, or to an invalid one.
     fn records(&mut self, input: &mut dyn Read, in_chunk: bool) -> io::Result<()> {
         let (mut header, mut data) = (Vec::new(), Vec::new());
         while !self.is_over {
@@ -90,7 +90,7 @@ impl Bag<'_> {
         let size = fields.u32("size").map_or(0, u64::from);
         match fields.get("compression") {
             Some(b"none") => self.records(body, true),
-            // No more comes out than the chunk says that it has, and of that one record at a time is kept.
+            // No more is unpacked than the chunk states, and one record of it at a time is kept.
             Some(b"bz2") => self.records(&mut BufReader::new(BzDecoder::new(body).take(size)), true),
             Some(b"lz4") => self.records(&mut BufReader::new(lz4::Decoder::new(body)?.take(size)), true),
             _ => Err(io::ErrorKind::InvalidData.into()),
@@ -143,7 +143,7 @@ fn u32_of(input: &mut dyn Read) -> io::Result<u32> {
     Ok(u32::from_le_bytes(bytes))
 }
 
-/// So many bytes; memory is taken as they come, and not because a length says so.
+/// Reads `length` bytes; memory is allocated as they arrive, not by the stated length.
 fn fill(input: &mut dyn Read, length: u32, into: &mut Vec<u8>) -> io::Result<()> {
     into.clear();
     let read = input.take(u64::from(length)).read_to_end(into)?;

@@ -1,4 +1,5 @@
-//! What rosbag2 compresses by itself: whole files, `.db3.zstd` and `.mcap.zstd`, or every message alone.
+//! Files and messages that rosbag2 compresses itself: whole files, `.db3.zstd` and `.mcap.zstd`, or every message
+//! alone.
 
 use std::fs::File;
 use std::io::{self, Read as _, Write as _};
@@ -14,9 +15,9 @@ use handeye_wording::Text;
 use handeye_wording::foreign;
 use handeye_wording::text;
 
-/// What a frame begins with. CDR begins with zero.
+/// The beginning of a frame. CDR begins with zero.
 const MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
-/// Bytes that are unpacked before the budget is asked.
+/// Bytes that are unpacked between two checks of the budget.
 const PIECE_BYTES: usize = 1 << 20;
 
 /// Whether a file is compressed as a whole.
@@ -24,7 +25,7 @@ fn is_compressed(file: &Path) -> bool {
     file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("zstd"))
 }
 
-/// The files of a bag as they are without compression; those that are unpacked for it lie in the folder that comes with them.
+/// The files of a bag as they are without compression; those that are unpacked for it are in the returned folder.
 ///
 /// # Errors
 /// A sentence, where one cannot be unpacked or the budget is spent.
@@ -65,7 +66,7 @@ fn unpack(from: &Path, to: &Path, budget: &Budget<'_>) -> Result<(), Text> {
                 out.write_all(&piece[..count]).map_err(reported)?;
                 is_empty = false;
             }
-            // One that breaks off has what came before: whoever reads it finds out how far that goes.
+            // A truncated file has the data before its end: its reader determines how far that goes.
             Err(error) if !is_empty => {
                 tracing::debug!("{} breaks off: {error}", from.display());
                 return Ok(());
