@@ -9,7 +9,7 @@ use handeye_record::{RerunChoice, WebViewer, record};
 use handeye_workbench::app::{App, Connect, Start};
 use handeye_workbench::command::Command;
 use handeye_workbench::model::{CellSource, Model, ViewSettings};
-use handeye_workbench::motion;
+use handeye_workbench::taught;
 use handeye_workbench::text::Language;
 use handeye_workbench::worker::{Clock, Waker};
 
@@ -26,7 +26,7 @@ impl Workbench {
     /// Starts it; new sessions go under `sessions`. It records as the window does.
     ///
     /// # Panics
-    /// When there are no more threads.
+    /// When the system cannot start more threads.
     pub fn start(source: CellSource, sessions: &Path, open: Option<PathBuf>) -> Self {
         Self::start_recording(source, sessions, open, RerunChoice::Record)
     }
@@ -34,7 +34,7 @@ impl Workbench {
     /// Starts it with a recording for Rerun that goes elsewhere.
     ///
     /// # Panics
-    /// When there are no more threads, or the recording cannot be made.
+    /// When the system cannot start more threads, or the recording cannot be created.
     pub fn start_recording(source: CellSource, sessions: &Path, open: Option<PathBuf>, rerun: RerunChoice) -> Self {
         let (wake, woken) = std::sync::mpsc::sync_channel(1);
         let waker: Waker = Arc::new(move || {
@@ -71,20 +71,21 @@ impl Workbench {
         self.app.apply(command);
     }
 
-    /// Does what a user asks for, and lets the arm make the first move, which is asked for wherever there may be a real arm.
+    /// Carries out a user's command, and allows the arm to make the first move, which has to be confirmed wherever the arm
+    /// may be real.
     ///
     /// # Panics
     /// When no move waits.
     pub fn allow(&mut self, command: impl Into<Command>) {
         self.click(command);
         self.until("the first move that waits", |model| model.asked.is_some());
-        self.click(motion::Command::ConfirmMove);
+        self.click(taught::Command::ConfirmMove);
     }
 
-    /// Waits until the model is like that.
+    /// Waits until the condition holds for the model.
     ///
     /// # Panics
-    /// When that does not happen, with what the window says by then.
+    /// When that does not happen, with the window's messages so far.
     pub fn until(&mut self, what: &str, is_so: impl Fn(&Model) -> bool) {
         let deadline = Instant::now() + PATIENCE;
         loop {
@@ -94,7 +95,7 @@ impl Workbench {
             }
             let left = deadline.saturating_duration_since(Instant::now());
             assert!(!left.is_zero(), "waiting for {what}; the window says:\n{}", self.text());
-            // Also without a wake: time itself is part of the model.
+            // Also without a wake-up: time itself is part of the model.
             let _woken = self.woken.recv_timeout(left.min(Duration::from_millis(100))).is_ok();
         }
     }

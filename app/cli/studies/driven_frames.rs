@@ -1,11 +1,11 @@
-//! What the thread of the window does for a frame while a person goes the whole way over drivers: connect, capture ten, solve,
-//! verify, export.
+//! What the thread of the window does for a frame while the user does the whole workflow over drivers: connect, capture ten,
+//! solve, verify, export.
 //!
 //!     cargo run --release -p handeye_app --example driven_frames
 //!
-//! Prints for each way the median, the 99th percentile and the worst of all its frames from the first one on (fonts and connections
-//! included), 60 a second without a graphics card, and how far the answer is from the truth. The program is its own drivers, each
-//! a process; the cell behind them keeps pace with real time.
+//! Prints for each run the median, the 99th percentile and the worst of all its frames from the first one on (fonts and connections
+//! included), 60 a second without a graphics card, and the error of the answer. The program is its own drivers, each a process; the
+//! cell behind them keeps pace with real time.
 
 mod window;
 
@@ -31,7 +31,7 @@ use handeye_workbench::model::{
 use handeye_workbench::{capture, connect, export, motion, taught};
 use window::Drawn;
 
-/// Longest wait for anything that a person waits for.
+/// Longest wait for anything in the workflow.
 const PATIENCE: Duration = Duration::from_mins(2);
 /// Captures of a calibration, and for its verification.
 const CAPTURES: usize = 10;
@@ -68,7 +68,7 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The command of a driver of one part of a cell; its process writes its number into a file of the part's name.
+/// The command of a driver of one part of a cell; its process writes its id into a file of the part's name.
 fn driver(cell: &Endpoint, part: &str, clock_s: f64, numbers: &Path) -> anyhow::Result<String> {
     let (program, number) = (std::env::current_exe()?, numbers.join(part));
     Ok(format!("'{}' {part} {cell} {clock_s} '{}'", program.display(), number.display()))
@@ -85,10 +85,10 @@ fn be_driver(part: &str, cell: Endpoint, clock_s: f64, number: &Path) -> anyhow:
     Ok(Fake::start(options)?.converse(stdin().lock(), stdout())?)
 }
 
-/// The way of a person over these drivers.
+/// A user's run over these drivers.
 struct Way {
     drawn: Drawn,
-    /// A person's hand on the arm, and the pendant.
+    /// The user's hand on the arm, and the pendant.
     hand: Arm,
     killed: Option<PathBuf>,
 }
@@ -141,7 +141,7 @@ impl Way {
         self.drawn.app().apply(command);
     }
 
-    /// Draws until the model is like that.
+    /// Draws until the condition holds for the model.
     fn until(&mut self, what: &str, is_so: impl Fn(&Model) -> bool) -> anyhow::Result<()> {
         let began = Instant::now();
         while !is_so(self.drawn.app().model()) {
@@ -170,7 +170,7 @@ impl Way {
         self.click(taught::Command::Import(reference_poses()));
         self.until("the poses", |model| model.taught().len() == CAPTURES)?;
         self.click(taught::Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
-        self.click(motion::Command::ConfirmMove);
+        self.click(taught::Command::ConfirmMove);
         if let Some(number) = self.killed.take() {
             self.until("five captures", |model| captured(model) >= 5)?;
             let number = std::fs::read_to_string(number)?;
@@ -179,7 +179,7 @@ impl Way {
             self.until("the driver again", |model| model.camera.is_connected() && !model.is_armed())?;
             self.allow()?;
             self.click(taught::Command::ContinueSequence);
-            self.click(motion::Command::ConfirmMove);
+            self.click(taught::Command::ConfirmMove);
         }
         self.until("ten captures", |model| {
             captured(model) == CAPTURES && !model.sequence_runs && model.motion == Motion::Idle
@@ -191,20 +191,20 @@ impl Way {
         let mut before = None;
         for pose in taught.iter().take(CAPTURES) {
             let Goal::Tip(goal) = pose.goal else { bail!("the reference poses are poses of the tip") };
-            // Two of them are equal, and a person is told that the second says nothing new.
+            // Two of them are equal, and the user is notified that the second adds nothing new.
             let mut place = *goal.isometry();
             if before.replace(goal) == Some(goal) {
                 place.translation.vector.x += 0.03;
             }
             self.lead(&Pose::from_isometry(place))?;
             self.capture(CapturePurpose::Calibrate)?;
-            // A pose that is typed before the last one was forgotten would be forgotten with it.
+            // A pose that is typed before the last one was cleared would be cleared with it.
             self.until("the question for the next pose", |model| model.robot.is_none())?;
         }
         Ok(())
     }
 
-    /// A person moves the arm, which the window does not wait for, and types what the pendant shows.
+    /// The user moves the arm, which the window does not wait for, and types what the pendant shows.
     fn lead(&mut self, goal: &Pose<Base, Tip>) -> anyhow::Result<()> {
         let cancel = CancelToken::default();
         let limits = limits::of_tip(&limits::SEQUENCE, 1.0);
@@ -251,7 +251,7 @@ impl Way {
         Ok(())
     }
 
-    /// How far the answer is from the truth, which no driver reports.
+    /// The error of the answer relative to the truth, which no driver reports.
     fn error_mm(&mut self, truth: &Pose<Tip, Camera>) -> anyhow::Result<f64> {
         let solved = self.drawn.app().model().solve.current().context("not solved")?;
         let found = solved.result.hand_eye.as_ref().context("no robot")?.translation_m;

@@ -25,7 +25,7 @@ pub enum Group {
 }
 
 impl Group {
-    /// For people.
+    /// For display.
     pub(crate) fn name(self, language: Language) -> &'static str {
         match self {
             Self::Work => tr!(language, "Robot and captures"),
@@ -40,7 +40,7 @@ impl Group {
 /// Something that can be done.
 #[derive(Debug, Clone)]
 pub struct Action {
-    /// For people.
+    /// For display.
     pub name: &'static str,
     /// Where the help lists it.
     pub group: Group,
@@ -85,7 +85,7 @@ const STEPS: [&[KeyboardShortcut]; 7] = [
     &[plain(Key::Num7)],
 ];
 
-/// All of it, in the order of the help.
+/// All actions, in the order of the help.
 pub fn all(model: &Model, language: Language) -> Vec<Action> {
     let mut all = work(model, language);
     all.extend(session(model, language));
@@ -156,10 +156,10 @@ fn work(model: &Model, language: Language) -> Vec<Action> {
         plain(tr!(language, "Stop the sequence"), taught::Command::StopSequence.into(), sequence.is_some()),
         plain(
             tr!(language, "Move there"),
-            motion::Command::ConfirmMove.into(),
+            taught::Command::ConfirmMove.into(),
             asks && crate::shell::reasons::unmovable(model).is_none() && model.motion == Motion::Idle,
         ),
-        plain(tr!(language, "Skip this pose"), motion::Command::SkipMove.into(), asks),
+        plain(tr!(language, "Skip this pose"), taught::Command::SkipMove.into(), asks),
         plain(
             tr!(language, "Skip this view"),
             by_hand::Command::SkipView.into(),
@@ -291,7 +291,7 @@ fn window(model: &Model, language: Language) -> Vec<Action> {
     all
 }
 
-/// The keys of an action as people write them.
+/// The keys of an action as usually written.
 pub(crate) fn keys_text(ctx: &egui::Context, action: &Action) -> Vec<String> {
     let names = egui::ModifierNames::NAMES;
     let is_mac = ctx.os().is_mac();
@@ -312,8 +312,8 @@ pub(crate) fn keys_text(ctx: &egui::Context, action: &Action) -> Vec<String> {
         .collect()
 }
 
-/// What the keys that were pressed in this frame ask for, but for the stop. Nothing while text is typed; a key without
-/// Ctrl belongs to the widget that has the focus.
+/// The commands of the keys that were pressed in this frame, except the stop. Nothing while text is typed; a key
+/// without Ctrl belongs to the widget that has the focus.
 pub fn pressed(ctx: &egui::Context, model: &Model) -> Vec<Command> {
     let any =
         ctx.input(|input| input.events.iter().any(|event| matches!(event, egui::Event::Key { pressed: true, .. })));
@@ -323,7 +323,7 @@ pub fn pressed(ctx: &egui::Context, model: &Model) -> Vec<Command> {
     let focused = ctx.memory(|memory| memory.focused().is_some());
     let mut commands = Vec::new();
     let mut actions = all(model, Language::English);
-    // Ctrl+Shift+Z is also Ctrl+Z with one key more: the longer one goes first.
+    // Ctrl+Shift+Z is also Ctrl+Z with one more key: the longer one goes first.
     actions.sort_by_key(|action| !action.keys.iter().any(|keys| keys.modifiers.shift));
     for action in actions {
         let keys = action.keys.iter().filter(|keys| keys.logical_key != STOP_KEY);
@@ -343,8 +343,8 @@ mod tests {
     use handeye_workbench::command::CommandKind;
     use handeye_workbench::model::{CellSource, ViewSettings};
 
-    /// Commands with a value that only the place has where it is chosen: a pose in a row, a number that is typed, a point of an
-    /// image, a file, a key that is held.
+    /// Commands with a value that is only available where it is chosen: a pose in a row, a typed number, a point of an image, a
+    /// file, a held key.
     const ONLY_IN_PLACE: &[CommandKind] = {
         use handeye_workbench::capture::command::CommandKind as Capture;
         use handeye_workbench::connect::command::CommandKind as Connect;
@@ -393,7 +393,6 @@ mod tests {
             CommandKind::Motion(Motion::JogReleased),
             CommandKind::Motion(Motion::Move),
             CommandKind::Motion(Motion::MoveCorrected),
-            CommandKind::Motion(Motion::SetConfirmMoves),
             CommandKind::Motion(Motion::SetJog),
             CommandKind::Scene(Scene::SetView),
             CommandKind::Session(Session::ListFolder),
@@ -421,6 +420,7 @@ mod tests {
             CommandKind::Taught(Taught::Remove),
             CommandKind::Taught(Taught::Rename),
             CommandKind::Taught(Taught::Reorder),
+            CommandKind::Taught(Taught::SetConfirmMoves),
             CommandKind::Track(Track::HideBoard),
             CommandKind::Track(Track::MoveBoard),
             CommandKind::Track(Track::SetCorrected),

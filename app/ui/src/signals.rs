@@ -1,15 +1,14 @@
-//! Signals that ask the window to end: it closes as if a person had closed it.
+//! Signals that ask the window to end: it closes as if the user had closed it.
 
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use handeye_workbench::worker::{StopLine, Waker};
 
-/// So long after a signal the program ends whatever it does. Who asks a program to end waits for a few seconds and then
-/// kills it.
+/// This long after a signal the program ends in any case: service managers wait for a few seconds and then kill it.
 const LIMIT: Duration = Duration::from_millis(1900);
 
-/// Whether the system has asked for the end (SIGINT, SIGTERM, SIGHUP).
+/// Whether the system has requested the end (SIGINT, SIGTERM, SIGHUP).
 #[derive(Default)]
 pub struct Signals {
     asked: OnceLock<()>,
@@ -17,7 +16,7 @@ pub struct Signals {
 }
 
 impl Signals {
-    /// Listens from now on, on a thread of its own.
+    /// Starts to listen, on a thread of its own.
     pub fn listen() -> Arc<Self> {
         let signals = Arc::new(Self::default());
         let heard = Arc::clone(&signals);
@@ -27,7 +26,7 @@ impl Signals {
         signals
     }
 
-    /// The first signal counts; others come to a thread that waits already.
+    /// The first signal counts; others find the thread already waiting.
     fn asked(&self) {
         self.hear();
         std::thread::sleep(LIMIT);
@@ -58,17 +57,15 @@ impl Signals {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use handeye_workbench::connect::stop_line::Ends;
     use handeye_workbench::model::{MotionGoal, MotionId, MotionRequest};
     use handeye_workbench::motion::desk::{MotionQueue, MotionTask, Work};
-    use handeye_workbench::worker::channels::Requests;
+    use handeye_workbench::motion::stop_line::Ends;
 
     #[test]
     fn a_signal_ends_what_moves_whatever_the_window_does() {
         let (stop, waker): (Arc<StopLine>, Waker) = (Arc::default(), Arc::new(|| {}));
         let desk = Arc::new(MotionQueue::new(Arc::clone(stop.grip()), Arc::clone(&waker)));
-        let (control, _requests) = Requests::with_limit(1);
-        stop.lead_to(Ends { desk: Arc::clone(&desk), control, clock: Arc::new(|| 0.0) });
+        stop.lead_to(Ends { desk: Arc::clone(&desk), wake_control: Box::new(|| {}), clock: Arc::new(|| 0.0) });
         let signals = Signals::default();
         signals.lead_to(Arc::clone(&stop), waker);
         desk.connected();

@@ -14,8 +14,10 @@ use serde::{Deserialize, Serialize};
 use toml::de::{DeTable, ValueDeserializer};
 
 use crate::messages;
-use crate::model::{CellSource, DepthScale, Drivers, RotationFormat, Severity, ThemeChoice, ViewSettings};
+use crate::messages::state::Severity;
+use crate::shell::view::{DepthScale, RotationFormat, ThemeChoice, ViewSettings};
 use crate::text::{Language, Text};
+use handeye_link::{CellSource, Drivers};
 use handeye_wording::text;
 
 /// The name of this program's folders in those of the system.

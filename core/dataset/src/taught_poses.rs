@@ -41,12 +41,12 @@ use handeye_wording::Text;
 use handeye_wording::one_line;
 use handeye_wording::text;
 
-/// What `format` says.
+/// Value of `format`.
 pub const FORMAT: &str = "handeye-poses";
-/// What `version` says.
+/// Value of `version`.
 pub const VERSION: u32 = 1;
 
-/// How far from 1 the length of a quaternion may be, as in dataset folders.
+/// Largest deviation of a quaternion's length from 1, as in dataset folders.
 const UNIT_TOLERANCE: f64 = 1e-3;
 /// A length within this of 1 is 1 up to rounding, and the quaternion stays as it is.
 const ROUNDING: f64 = 1e-12;
@@ -54,35 +54,36 @@ const ROUNDING: f64 = 1e-12;
 /// Taught poses, and how to move between them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TaughtPoses {
-    /// Which joints are prismatic, counted from 0 at the base.
+    /// Indices of the prismatic joints, counted from 0 at the base.
     pub prismatic: Vec<usize>,
-    /// Where the robot begins, joint values in radians, or metres of a prismatic joint.
+    /// Start of the robot, joint values in radians, or metres for a prismatic joint.
     pub start_joints_rad: Option<Vec<f64>>,
-    /// How fast it may move.
+    /// Speed limits.
     pub limits: Option<MotionLimits>,
     /// The poses in the order in which they are visited. Two may be equal.
     pub poses: Vec<TaughtPose>,
 }
 
-/// One taught pose, as sessions record it; the file has names and degrees of its own.
+/// One taught pose, as sessions record it; the file has its own names, and degrees.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TaughtPose {
     /// Its name; no two poses have the same.
     pub name: String,
-    /// Where it is.
+    /// The goal of the pose.
     pub goal: Goal,
-    /// The cell that it was taught on; `None` where nobody knows, as in sessions of versions that did not record it.
+    /// The cell that it was taught on; `None` where that is not known, as in sessions of versions that did not record
+    /// it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cell: Option<TaughtOn>,
 }
 
 impl TaughtPose {
-    /// One of which the cell is not known.
+    /// A pose whose cell is not known.
     pub fn new(name: impl Into<String>, goal: Goal) -> Self {
         Self { name: name.into(), goal, cell: None }
     }
 
-    /// Whether its goal is another number of joint values.
+    /// Whether its goal has another number of joint values.
     pub fn joints_differ(&self, count: usize) -> bool {
         matches!(&self.goal, Goal::Joints(joints) if joints.len() != count)
     }
@@ -97,32 +98,33 @@ impl TaughtPose {
     }
 }
 
-/// The cell that poses were taught on. They lead another arm, or the same one elsewhere, to where nobody looked, and show a camera
-/// another target from there.
+/// The cell that poses were taught on. Another arm, or the same one elsewhere, would move to an unchecked place, and the camera
+/// might see another target from there.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TaughtOn {
-    /// Where the arm is found, and with it the base: a scene, an address or a driver.
+    /// Source of the arm, and with it of the base: a scene, an address or a driver.
     pub base: String,
     /// The joints from the base up.
     pub joints: Vec<TaughtJoint>,
-    /// Where the tip is while all joints are at 0, metres; `None` where the chain of joints is not known beforehand.
+    /// Position of the tip with all joints at 0, metres; `None` where the chain of joints is not known beforehand.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip_at_zero_m: Option<[f64; 3]>,
-    /// What is looked at.
+    /// The target.
     pub target: TargetSpec,
 }
 
 /// A joint of the arm that poses were taught on.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TaughtJoint {
-    /// How it moves.
+    /// Revolute or prismatic.
     pub kind: JointKind,
-    /// How far, radians or metres; `None` without end.
+    /// Range, radians or metres; `None` for a cyclic joint.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub range: Option<[f64; 2]>,
 }
 
-/// Ends of a joint that differ by less are the same \[rad, m\], and tips \[m\]: a simulator computes them again for every connection.
+/// Ends of a joint that differ by less are the same \[rad, m\], and tips \[m\]: a simulator computes them again for every
+/// connection.
 const SAME_RANGE: f64 = 1e-6;
 const SAME_TIP_M: f64 = 1e-3;
 
@@ -146,7 +148,7 @@ impl TaughtOn {
     }
 }
 
-/// Where a taught pose is.
+/// Goal of a taught pose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Goal {
     /// A pose of the tip.
@@ -157,7 +159,8 @@ pub enum Goal {
     Joints(Vec<f64>),
 }
 
-/// Limits of motion. Joint limits are radians and hold for every joint that turns; one that shifts has those of the tip. Tip limits are metres and radians alike.
+/// Limits of motion. Joint limits are radians and hold for every joint that turns; one that shifts has those of the tip. Tip
+/// limits are metres and radians alike.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionLimits {
     /// rad/s.
@@ -174,7 +177,7 @@ pub struct MotionLimits {
     pub tip_jerk: f64,
 }
 
-/// What is wrong with a pose file, in one line: `FILE, row N, pose "NAME": what`.
+/// An error of a pose file, in one line: `FILE, row N, pose "NAME": what`.
 #[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[error("{place}: {problem}", place = place(file, *row, pose.as_deref()))]
 #[non_exhaustive]
@@ -185,7 +188,7 @@ pub struct PosesError {
     pub row: Option<usize>,
     /// The pose, quoted, where the defect is in one.
     pub pose: Option<String>,
-    /// What is wrong.
+    /// The error.
     pub problem: PosesProblem,
 }
 
@@ -198,8 +201,6 @@ fn place(file: &Path, row: Option<usize>, pose: Option<&str>) -> Text {
         (Some(row), Some(pose)) => text!("{file}, row {row}, pose {pose}", file = file, row = row, pose = pose),
     }
 }
-
-impl PosesError {}
 
 /// A defect of a pose file.
 #[derive(Debug, thiserror::Error, handeye_wording::Localized)]
@@ -229,10 +230,10 @@ pub enum PosesProblem {
     /// A pose without a goal, or with two.
     #[error("needs either base_from_tip or joints_deg")]
     Goal,
-    /// A number that is none.
+    /// A number that is not finite.
     #[error("{0} is not finite")]
     NotFinite(&'static str),
-    /// A quaternion that is none.
+    /// A quaternion that is not a unit quaternion.
     #[error("rotation_xyzw has length {0:.6}, which is more than {UNIT_TOLERANCE} from 1")]
     NotUnit(f64),
     /// Another number of joints than elsewhere in the file.
@@ -290,7 +291,7 @@ struct RawTransform {
     rotation_xyzw: [f64; 4],
 }
 
-/// Where a defect is, and in which pose, before the file is known.
+/// Place of an error, and its pose, before the file is known.
 struct Defect {
     row: Option<usize>,
     pose: Option<String>,
@@ -471,7 +472,7 @@ fn tip_pose(raw: &RawTransform) -> Result<Pose<Base, Tip>, PosesProblem> {
 /// Joint values of one arm.
 struct JointReader {
     prismatic: Vec<usize>,
-    /// As many as the first ones were.
+    /// Number of the first joint values.
     count: Option<usize>,
 }
 

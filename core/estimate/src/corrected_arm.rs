@@ -1,29 +1,29 @@
-//! An arm whose own errors are known: where its tip really is, and what to command so that it gets where it shall be.
+//! An arm whose own errors are known: where its tip really is, and what to command so that it gets where it should be.
 
-use nalgebra::{DMatrix, Matrix3, Matrix6, Vector6};
+use nalgebra::{DMatrix, Matrix3, Matrix6, Matrix6xX, Vector6};
 
 use crate::arm_fit::ArmFit;
 use crate::handeye::joint::{ArmErrors, SmallSample};
-use crate::verify::TipAt;
 use handeye_arm::{Arm, ArmError, IkError, JointRange};
 use handeye_geometry::frames::{Base, Pose, Tip};
 
-/// Steps of [`CorrectedArm::command`]. Each leaves of the distance what the errors of the arm are of its size: a few parts in a
+/// Steps of [`CorrectedArm::command`]. Each reduces the distance to the relative size of the arm's errors: a few parts in a
 /// thousand, and some parts in a hundred where zeros are off by degrees.
 const STEPS: usize = 20;
 /// Distance in metres and angle in radians at which a command has arrived.
 const ARRIVED: f64 = 1e-9;
 
-/// An arm as its controller takes it to be, where it stands, and what it is off.
+/// An arm as its controller models it, where it is mounted, and its errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CorrectedArm {
-    /// As the controller takes it to be.
+    /// The arm as its controller models it.
     pub arm: Arm,
-    /// What it is off.
+    /// The errors of the arm.
     pub errors: ArmErrors,
     /// Covariance of the errors, in the order of [`ArmErrors::numbers`].
     pub covariance: DMatrix<f64>,
-    /// What they do not explain, standard deviations of the tip's position \[m\] and orientation \[rad\] per axis.
+    /// What the errors do not explain: standard deviations of the tip's position \[m\] and orientation \[rad\] per
+    /// axis.
     pub unexplained: (f64, f64),
     /// How errors are distributed in units of the covariance.
     pub small_sample: SmallSample,
@@ -57,15 +57,15 @@ pub enum CorrectError {
 pub struct Command {
     /// Joint values to be commanded: radians.
     pub joints_rad: Vec<f64>,
-    /// The same as the controller's own kinematics has it.
+    /// The same by the controller's own kinematics.
     pub base_from_tip: Pose<Base, Tip>,
-    /// The distance that the tip stays under from where it shall be, with a probability of 95 %, metres.
+    /// Upper limit of the distance of the tip from the wanted pose, with a probability of 95 %, metres.
     pub error_95_m: f64,
 }
 
 impl CorrectedArm {
-    /// That of a calibration, with the arm where it stands, see [`place`](crate::placement::place); `None` where it is of an arm with
-    /// another number of joints.
+    /// The corrected arm of a calibration, with the arm where it is mounted, see [`place`](crate::placement::place); `None` where
+    /// the calibration is of an arm with another number of joints.
     pub fn new(arm: Arm, fit: &ArmFit) -> Option<Self> {
         (arm.joint_count() == fit.errors.joint_count()).then(|| Self {
             arm,
@@ -86,7 +86,7 @@ impl CorrectedArm {
         Ok(Pose::from_isometry(reported.isometry() * self.errors.reported_from_true(&reported, &frames)))
     }
 
-    /// The same with how it turns with the errors.
+    /// The same with its derivatives by the errors.
     ///
     /// # Errors
     /// As [`Arm::forward`].
@@ -97,16 +97,16 @@ impl CorrectedArm {
         Ok(TipAt { base_from_tip, by_errors: tip.by_errors })
     }
 
-    /// The chain of its links alone, with its joints where they really are, for descriptions of robots: [`Self::actual`] but for what
-    /// the joints give way by under gravity and for the field, which no fixed chain has.
+    /// The chain of its links alone, with its joints where they really are, for descriptions of robots: [`Self::actual`] without
+    /// the joints' compliance under gravity and without the field, which no fixed chain has.
     ///
     /// # Errors
-    /// [`ArmError`] where the errors are no errors of an arm.
+    /// [`ArmError`] where the errors are not those of an arm.
     pub fn of_links(&self) -> Result<Arm, ArmError> {
         self.arm.displaced(&self.errors.at_rest())
     }
 
-    /// Joint values in the middle of what the joints can do, where a search may begin of which nothing else is known.
+    /// Joint values in the middle of the ranges of the joints, as the start of a search when nothing else is known.
     pub fn middle_rad(&self) -> Vec<f64> {
         let middle = |range: JointRange| {
             if range.min.is_finite() && range.max.is_finite() { f64::midpoint(range.min, range.max) } else { 0.0 }
@@ -114,7 +114,7 @@ impl CorrectedArm {
         self.arm.ranges().into_iter().map(middle).collect()
     }
 
-    /// How far the tip is from [`Self::actual`] at the most with a probability of 95 %, metres.
+    /// How far the tip is from [`Self::actual`] at most with a probability of 95 %, metres.
     ///
     /// # Errors
     /// As [`Arm::forward`].
@@ -135,17 +135,17 @@ impl CorrectedArm {
         Ok(unexplained + Matrix6::from_iterator(known.iter().copied()))
     }
 
-    /// What to command so that the tip really is at `wanted`, by the configuration nearest to `near`.
+    /// The command that takes the tip to the true pose `wanted`, by the configuration nearest to `near`.
     ///
     /// # Errors
-    /// [`CorrectError`] says why the arm does not get there.
+    /// [`CorrectError`] states why the arm does not get there.
     pub fn command(&self, wanted: &Pose<Base, Tip>, near: &[f64]) -> Result<Command, CorrectError> {
         let joints_rad = self.joints_for(wanted, near, ARRIVED)?;
         let error_95_m = self.error_95_m(&joints_rad)?;
         Ok(Command { base_from_tip: self.arm.forward(&joints_rad)?, joints_rad, error_95_m })
     }
 
-    /// The joint values of [`Self::command`], as near to where the tip shall be as `arrived` says, metres and radians.
+    /// The joint values of [`Self::command`], as near to the wanted pose as `arrived` requires, metres and radians.
     pub(crate) fn joints_for(
         &self,
         wanted: &Pose<Base, Tip>,
@@ -163,7 +163,7 @@ impl CorrectedArm {
                 return Ok(joints_rad);
             }
             distance_m = off_m;
-            // What the tip is off by there it is off by nearby.
+            // The error of the tip there is also its error nearby.
             let by_errors = actual.inverse() * pose;
             pose = *wanted * by_errors;
         }
@@ -173,6 +173,21 @@ impl CorrectedArm {
 
 fn position(covariance: &Matrix6<f64>) -> Matrix3<f64> {
     covariance.fixed_view::<3, 3>(0, 0).into_owned()
+}
+
+/// A tip pose.
+#[derive(Debug, Clone)]
+pub struct TipAt {
+    /// The pose as reported, or corrected for the errors of the arm.
+    pub base_from_tip: Pose<Base, Tip>,
+    /// The twists `[t; r]` on its right by which it changes with these errors; no columns where it is not corrected.
+    pub by_errors: Matrix6xX<f64>,
+}
+
+impl From<&Pose<Base, Tip>> for TipAt {
+    fn from(reported: &Pose<Base, Tip>) -> Self {
+        Self { base_from_tip: *reported, by_errors: Matrix6xX::zeros(0) }
+    }
 }
 
 #[cfg(test)]

@@ -61,24 +61,24 @@
 //! # }
 //! ```
 //!
-//! From observations to a [`Fit`]: intrinsics, closed forms, the joint estimate, and how well its own model knows it. A fit states no
-//! error: [`diagnose::examine`] looks for contradictions and yields the [`diagnose::Calibration`] that does, and
+//! From observations to a [`Fit`]: intrinsics, closed forms, the joint estimate, and its uncertainty by its own model. A fit states
+//! no error: [`diagnose::examine`] tests for contradictions and yields the [`diagnose::Calibration`] that does, and
 //! [`diagnose::calibrate`] does both.
 //!
 //! | module | does |
 //! | --- | --- |
 //! | [`intrinsics`] | the lens from views of a target, without a robot |
-//! | [`handeye`] | closed forms, and the joint estimate of camera, target, lens, robot noise and what else the images show |
+//! | [`handeye`] | closed forms, and the joint estimate of camera, target, lens, robot noise and other visible effects |
 //! | [`uncertainty`] | covariance, overdispersion, expected error of a point |
 //! | [`diagnose`] | hypotheses about conventions and pairing, findings, the doctor, the calibration that states its error |
 //! | [`verify`] | predictions for views outside the fit, depth cameras |
-//! | [`corrected_arm`] | where the tip of an arm with errors really is, and what to command instead |
+//! | [`corrected_arm`] | the true tip pose of an arm with errors, and the corrected command |
 //! | [`reach_error`] | how near a tool arrives at a point that the camera saw |
-//! | [`robot_accuracy`] | the same where of the arm no more is known than how accurate it is |
-//! | [`resolution`], [`shared_lens`], [`placement`] | resolution of poses, several cameras of a kind, an arm by its joint values |
+//! | [`robot_accuracy`] | the same where only the accuracy of the arm is known |
+//! | [`resolution`], [`shared_lens`], [`placement`] | resolution of poses, sessions with one lens, an arm by its joint values |
 //!
-//! Conventions are in `docs/reference/conventions.md`, the mathematics in `docs/maths`. Results are the same in every run and on any number of
-//! cores: no clock, no hidden seed. Never depends on images, files, OpenCV, windows or sockets.
+//! Conventions are in `docs/reference/conventions.md`, the mathematics in `docs/maths`. Results are the same in every run and on
+//! any number of cores: no clock, no hidden seed. Never depends on images, files, OpenCV, windows or sockets.
 
 #![warn(missing_docs)]
 
@@ -121,7 +121,7 @@ use crate::handeye::one_axis::PartialHandEye;
 use crate::handeye::screening::Distance;
 use crate::handeye::{HandEye, HandEyeError, Mode, PosePair, motion, one_axis, subset};
 use crate::intrinsics::IntrinsicsError;
-use crate::shared_lens::SharedLens;
+use crate::shared_lens::found::SharedLens;
 use crate::stated_uncertainty::Alternative;
 use crate::uncertainty::overdispersion::Overdispersion;
 use crate::uncertainty::quality;
@@ -133,10 +133,11 @@ use handeye_geometry::progress::{Stage, Work};
 use handeye_geometry::targets::bent::BoardShape;
 pub use handeye_geometry::view_equations::DepthBias;
 
-/// Views of a good session: the noise levels rest on as many numbers, and with ten they are known to a fifth.
+/// Views of a good session: the noise levels rest on the numbers of this many views, and with ten they are known to a
+/// fifth.
 pub const GOOD_VIEWS: usize = 10;
 
-/// Which answer is asked for.
+/// Which answer is requested.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
     /// The joint estimate; from pose pairs alone the pose graph.
@@ -160,7 +161,7 @@ impl Method {
         }
     }
 
-    /// The method of that name.
+    /// The method with that name.
     pub fn by_name(name: &str) -> Option<Self> {
         if name == "joint" {
             return Some(Self::Joint);
@@ -169,52 +170,52 @@ impl Method {
     }
 }
 
-/// What may be changed about a calibration.
+/// Settings of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Options {
     /// Keep views and corners that do not fit the others; without it they are left out as outliers and named.
     pub keep_outliers: bool,
     /// Estimate the true size of the target, or with poses of the target alone the unit of their translations; the robot's
-    /// translations tell it.
+    /// translations determine it.
     pub free_scale: bool,
 }
 
-/// What an attempt at the depths of the views gave.
+/// Result of an attempt to use the depths of the views.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DepthsInFit {
-    /// Views with depths.
+    /// Number of views with depths.
     pub views: usize,
     /// Noise of the depths of a view, which all of them have in common, metres.
     pub noise_m: f64,
-    /// How they count against corners.
+    /// Their weight against corners.
     pub weight: DepthWeight,
-    /// Probability that it is the other way with whether the depth camera is turned against the lens.
+    /// Probability of the other model of whether the depth camera is turned against the lens.
     pub other_probability: f64,
-    /// Errors of the depth camera where that is left open.
+    /// Errors of the depth camera with that left open.
     pub bias: DepthBias,
     /// Their covariance, in the order of [`DepthBias`].
     pub covariance: Matrix5<f64>,
     /// Error on held-out views without them, pixels.
     pub heldout_before_px: f64,
-    /// And with them.
+    /// Error on held-out views with them, pixels.
     pub heldout_after_px: f64,
     /// Whether the answer uses them.
     pub accepted: bool,
 }
 
 impl DepthsInFit {
-    /// How they count, where the answer uses them.
+    /// Their weight, where the answer uses them.
     pub(crate) fn weight(&self) -> Option<DepthWeight> {
         self.accepted.then_some(self.weight)
     }
 }
 
-/// The depths of the views as the joint estimate has them.
+/// The depths of the views as used by the joint estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointDepths {
-    /// What the attempt gave.
+    /// Result of the attempt.
     pub in_fit: DepthsInFit,
-    /// Errors of the depth camera as the answer has them; none where it does not use the depths.
+    /// Errors of the depth camera in the answer; zero where it does not use the depths.
     pub bias: DepthBias,
 }
 
@@ -229,7 +230,7 @@ pub struct ShapeEstimate {
     pub scale_sigma: Option<f64>,
 }
 
-/// The size of the target by the robot's motion, everything that the answer counts on being free beside it.
+/// The size of the target by the robot's motion, with everything that the answer includes free as well.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TargetSize {
     /// True over stated size.
@@ -238,7 +239,7 @@ pub struct TargetSize {
     pub sigma: f64,
     /// Degrees of freedom that the standard deviation rests on.
     pub degrees_of_freedom: f64,
-    /// The hand-eye transform with a target of that size, by what is known of sizes beforehand.
+    /// The hand-eye transform with a target of that size, with the prior of sizes.
     pub with: Alternative,
 }
 
@@ -252,13 +253,13 @@ pub enum CalibrateError {
          number of columns and rows, and that it is wholly in view"
     )]
     TargetNotFound {
-        /// In how many.
+        /// Number of images in which it was found.
         found: usize,
-        /// Of how many.
+        /// Number of all images.
         images: usize,
         /// Least number.
         need: usize,
-        /// What was looked for.
+        /// The target that was searched for.
         target: String,
     },
     /// Views were left out of the fit by the caller, and the rest is too few.
@@ -280,7 +281,7 @@ pub enum CalibrateError {
     /// The accuracy of a lens that is given is not in [`LENS_ACCURACY_PX`](handeye_geometry::observations::LENS_ACCURACY_PX).
     #[error("the lens given is said to be good to {accuracy_px} px: say a number of pixels between 0.001 and 1000")]
     LensAccuracy {
-        /// What is said.
+        /// The stated accuracy.
         accuracy_px: f64,
     },
     /// The target has no pose in a view.
@@ -306,19 +307,19 @@ pub enum CalibrateError {
     },
 }
 
-/// Where the lens begins among the unknowns that [`JointFit::covariance`] is of: both links come first.
+/// Where the lens begins among the unknowns of [`JointFit::covariance`]: both links come first.
 const LENS_AT: usize = 12;
 
-/// A lens that is farther off than is said of it.
+/// A lens whose error exceeds its stated accuracy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RefutedLens {
-    /// What is said of it, pixels.
+    /// Its stated accuracy, pixels.
     pub accuracy_px: f64,
-    /// What the lens that fits displaces points of the image by, RMS, pixels.
+    /// Displacement of points of the image by the lens that fits, RMS, pixels.
     pub off_px: f64,
 }
 
-/// What a fit gives. It states no error: [`Calibration`](crate::diagnose::Calibration) does, once the fit is examined.
+/// Result of a fit. It states no error: [`Calibration`](crate::diagnose::Calibration) does, once the fit is examined.
 #[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub struct Fit {
@@ -328,23 +329,24 @@ pub struct Fit {
     pub link_covariances: Option<LinkCovariances>,
     /// The camera; `None` when only pose pairs were given.
     pub camera: Option<CalibratedCamera>,
-    /// What the corners say of an estimated camera without the robot; `None` when it was given, and where a joint estimate
-    /// says it better.
+    /// Fit of an estimated camera to the corners without the robot; `None` when it was given, and where a joint estimate
+    /// gives a better one.
     pub camera_fit: Option<CameraFit>,
-    /// What an estimate from poses of the target alone says of them; `None` for one from corners, and for a closed form.
+    /// Quality of the poses by an estimate from poses of the target alone; `None` for one from corners, and for a closed
+    /// form.
     pub pose_fit: Option<PoseFit>,
     /// An estimated lens as the corners alone show it, by a flat target: it does not depend on the robot, which may be what is
     /// wrong. `None` where it was given, and where the corners show a bent target.
     pub(crate) lens_by_corners: Option<Intrinsics>,
     /// RMS of 2-D corner residuals, pixels.
     pub rms_px: Option<f64>,
-    /// What only the joint estimate knows; `None` for a closed form, and without a robot.
+    /// Results of the joint estimate only; `None` for a closed form, and without a robot.
     pub joint: Option<JointFit>,
-    /// Every closed form and what it said.
+    /// Every closed form and its result.
     pub methods: Vec<MethodResult>,
     /// One entry per view, in the order of the observations.
     pub views: Vec<ViewResult>,
-    /// The sessions that share the lens; `None` for a session by itself.
+    /// The sessions that share the lens; `None` for a single session.
     pub shared_lens: Option<SharedLens>,
 }
 
@@ -354,7 +356,8 @@ impl Fit {
         self.camera.as_ref().map(|camera| camera.intrinsics)
     }
 
-    /// Standard deviation of `ln(fx / fy)` of an estimated lens. fx and fy err alike, so it is smaller than theirs.
+    /// Standard deviation of `ln(fx / fy)` of an estimated lens. The errors of fx and fy are correlated, so it is
+    /// smaller than theirs.
     pub(crate) fn aspect_sigma(&self) -> Option<f64> {
         let camera = self.camera.filter(|camera| !camera.fixed)?;
         let Some(joint) = self.joint.as_ref().filter(|joint| joint.free.intrinsics) else {
@@ -375,7 +378,7 @@ impl Fit {
         self.link_covariances.as_ref().map(|links| &links.hand_eye)
     }
 
-    /// Error of a measured point where the camera saw the target by the noise alone, 95 %, metres: what a stated error begins with.
+    /// Error of a measured point where the camera saw the target by the noise alone, 95 %, metres: the basis of a stated error.
     pub(crate) fn modelled_error_95_m(&self) -> Option<f64> {
         self.modelled_error_95_at(&self.joint.as_ref()?.reference_point)
     }
@@ -389,9 +392,9 @@ impl Fit {
 /// Covariances of the rigid links, right perturbations `[t; r]`, m and rad.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinkCovariances {
-    /// Of the camera on its mount.
+    /// Covariance of the camera on its mount.
     pub hand_eye: Matrix6<f64>,
-    /// Of the target on its anchor.
+    /// Covariance of the target on its anchor.
     pub target: Matrix6<f64>,
 }
 
@@ -413,11 +416,11 @@ pub struct CameraFit {
     /// Standard deviations of fx, fy, cx, cy in pixels, see [`Stated`](intrinsics::Stated); `None` where there are no more
     /// residuals than unknowns.
     pub sigma_px: Option<[f64; 4]>,
-    /// Standard deviation of `ln(fx / fy)`; `None` likewise.
+    /// Standard deviation of `ln(fx / fy)`; `None` in the same case.
     pub aspect_sigma: Option<f64>,
-    /// Noise of a corner per axis, pixels; `None` likewise.
+    /// Noise of a corner per axis, pixels; `None` in the same case.
     pub noise_px: Option<f64>,
-    /// By how much standard deviations are larger than those of corners that err independently, because the views scatter
+    /// Factor by which standard deviations are larger than with independent corner errors, because the views scatter
     /// more; smaller than 1 where they happen to scatter less.
     pub times: f64,
     /// Degrees of freedom that the standard deviation rests on.
@@ -426,13 +429,13 @@ pub struct CameraFit {
     pub shape: Option<ShapeEstimate>,
 }
 
-/// What an estimate from poses of the target alone says of them.
+/// Quality of the poses by an estimate from poses of the target alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct PoseFit {
-    /// Disagreement of robot and target poses per axis, translation, metres.
+    /// Standard deviation between robot and target poses per axis, translation, metres.
     pub sigma_m: f64,
-    /// Rotation, radians.
+    /// The same for rotation, radians.
     pub sigma_rad: f64,
     /// The true length of their translations over the stated one, as the scale of the target; `None` when it is taken as
     /// exact.
@@ -458,19 +461,19 @@ impl CameraFit {
     }
 }
 
-/// What the joint estimate knows beyond the links and the camera.
+/// Results of the joint estimate beyond the links and the camera.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct JointFit {
-    /// What was estimated besides the links.
+    /// What was estimated in addition to the links.
     pub free: Free,
     /// Covariance of all that predictions share, as in
     /// [`JointSolution::covariance`](crate::handeye::joint::JointSolution::covariance).
     pub covariance: DMatrix<f64>,
     /// Noise levels.
     pub noise: Noise,
-    /// How corners count against each other: [`Noise::corner_px`] is of one whose detector states what is usual. `None` where all
-    /// are alike.
+    /// Weights of corners relative to each other: [`Noise::corner_px`] is that of a corner with a typical stated covariance.
+    /// `None` where all are equal.
     pub weights: Option<CornerWeights>,
     /// How the error of the hand-eye transform is distributed in units of its covariance.
     pub small_sample: SmallSample,
@@ -485,31 +488,31 @@ pub struct JointFit {
     pub heldout_rms_px: Option<f64>,
     /// The same by the two links alone, without the robot's field; the same number where there is none.
     pub heldout_links_rms_px: Option<f64>,
-    /// Errors of the robot that depend on where it stands, where the data show them.
+    /// Pose-dependent errors of the robot, where the data show them.
     pub field: Option<PoseDependentError>,
-    /// What the points of the target are off their drawing, where the data show it; residuals are with it.
+    /// Print errors of the target's points, where the data show them; residuals include them.
     pub print: Option<PrintErrors>,
-    /// What the lens does beyond its model, where the data show it; residuals are with it.
+    /// Residual distortion of the lens, where the data show it; residuals include it.
     pub residual_distortion: Option<ShownDistortion>,
     /// What [`heldout_rms_px`](Self::heldout_rms_px) should be if the model and its noise levels are true, pixels.
     pub expected_heldout_rms_px: f64,
-    /// By how much the robot's noise moves a corner, RMS of the 2-D distance in pixels; what of it a fit cannot follow
-    /// stays in the answer.
+    /// By how much the robot's noise moves a corner, RMS of the 2-D distance in pixels; the part that a fit cannot
+    /// follow stays in the answer.
     pub robot_effect_px: f64,
-    /// What was known of the lens beforehand and counts, where that is not all or nothing.
+    /// Prior knowledge of the lens that was used, where it is neither exact nor none.
     pub known_lens: Option<KnownLens>,
-    /// What was said of the lens, where the views contradict it: the lens is estimated from them alone.
+    /// The stated accuracy of the lens, where the views contradict it: the lens is estimated from them alone.
     pub refuted_lens: Option<RefutedLens>,
-    /// What the expected error (95 %) would be where it is stated if a lens that was taken as exact were only known to half a pixel,
+    /// The expected error (95 %) at the point where it is stated if a lens that was taken as exact were only known to half a pixel,
     /// metres; `None` where the lens is estimated.
     pub error_at_half_a_pixel_95_m: Option<f64>,
     /// The shape of the target when it was estimated.
     pub shape: Option<ShapeEstimate>,
-    /// Its size by the robot's motion; `None` where that says nothing of it.
+    /// Its size by the robot's motion; `None` where that does not determine it.
     pub size: Option<TargetSize>,
-    /// The errors of the robot's arm and the transforms that go with them; `None` where its joints are not known.
+    /// The errors of the robot's arm and the transforms that belong to them; `None` where its joints are not known.
     pub arm: Option<ArmFit>,
-    /// What an attempt at the depths of the views gave; `None` when there was none.
+    /// Result of an attempt to use the depths of the views; `None` when there was none.
     pub depths: Option<JointDepths>,
 }
 
@@ -521,7 +524,7 @@ impl JointFit {
     }
 }
 
-/// What one closed form said.
+/// Result of one closed form.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MethodResult {
     /// Its name on the command line.
@@ -530,7 +533,7 @@ pub struct MethodResult {
     pub outcome: Result<ClosedFormSolution, HandEyeError>,
 }
 
-/// What became of one view.
+/// Result for one view.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewResult {
     /// Its name in the observations.
@@ -545,9 +548,9 @@ pub struct ViewResult {
     pub correction_m: Option<f64>,
     /// Angle of the correction of its reported tip orientation, radians.
     pub correction_rad: Option<f64>,
-    /// Residuals of its corners, in the order observed. Those of the joint estimate are with the robot pose corrected,
-    /// those of a closed form of the bare chain, those without a robot of the target's own pose. Empty where no
-    /// residual is known: no target, excluded, poses alone, or a chain that puts a corner behind the camera.
+    /// Residuals of its corners, in the order observed. With a joint estimate they are by the corrected robot pose,
+    /// with a closed form by the bare chain, without a robot by the target's own pose. Empty where no residual is
+    /// known: no target, excluded, poses alone, or a chain that puts a corner behind the camera.
     pub residuals: Vec<CornerResidual>,
     /// The target's pose as fitted, by the same chain as the residuals.
     pub camera_from_target: Option<Pose<Camera, Target>>,
@@ -560,7 +563,7 @@ pub struct ViewResult {
 }
 
 impl ViewResult {
-    /// A view of which nothing is known yet.
+    /// A view without any results yet.
     fn new(view: &ObservedView, status: ViewStatus) -> Self {
         Self {
             name: view.name.clone(),
@@ -602,7 +605,7 @@ pub enum ViewStatus {
     NoTarget,
 }
 
-/// Fits hand-eye and camera to observations. Whether the data agree with the model is not looked at:
+/// Fits hand-eye and camera to observations. Whether the data agree with the model is not examined:
 /// [`diagnose::calibrate`] does that as well.
 ///
 /// `work` is a `&CancelToken`, or a [`Work`] to follow the progress too.
@@ -612,11 +615,11 @@ pub enum ViewStatus {
 ///
 /// # Many views
 /// Work that grows faster than the number of views is done on a choice of them, the same every time. Of more than
-/// [`subset::MOST_VIEWS`] views so many go into the closed forms, and the fits that leave views out keep the noise levels
-/// of the whole. The intrinsics and the joint estimate take all views.
+/// [`subset::MOST_VIEWS`] views only that many go into the closed forms, and the fits that leave views out keep the noise
+/// levels of the whole. The intrinsics and the joint estimate take all views.
 ///
 /// # Errors
-/// [`CalibrateError`] says what is missing and what to do; [`HandEyeError::Cancelled`] inside it when `work` was.
+/// [`CalibrateError`] states what is missing and what to do; [`HandEyeError::Cancelled`] inside it when `work` was.
 pub fn fit<'a>(observations: &Observations, method: Method, work: impl Into<Work<'a>>) -> Result<Fit, CalibrateError> {
     fit_with(observations, method, Options::default(), work)
 }
@@ -641,11 +644,11 @@ pub fn fit_with<'a>(
     }
 }
 
-/// A robot that never turned is better named than a singular matrix. Works on the same choice of views as
-/// [`closed_forms`].
+/// An error about a robot that never turned is more useful than one about a singular matrix. Works on the same choice
+/// of views as [`closed_forms`].
 ///
 /// # Errors
-/// What [`motion::analyse`] finds, or what turns about one axis determine all the same.
+/// Those of [`motion::analyse`], or the partial result that turns about one axis still determine.
 fn check_motion(mode: Mode, pairs: &[PosePair]) -> Result<(), CalibrateError> {
     let poses: Vec<_> = pairs.iter().map(|pair| pair.anchor_from_mount).collect();
     let Err(error) = motion::analyse(&poses) else { return Ok(()) };

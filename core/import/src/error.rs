@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use super::formats::with_poses;
 use handeye_files::budget::Spent;
 use handeye_pairs::clock_offset::ClockOffsetError;
 use handeye_wording::Text;
@@ -12,12 +11,12 @@ use handeye_wording::text;
 #[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum ImportError {
-    /// The file system says no.
+    /// The file system refuses.
     #[error("{file}: cannot be read: {why}", file = file.display())]
     Unreadable {
         /// The file or folder.
         file: PathBuf,
-        /// What the system says.
+        /// The error of the operating system.
         why: String,
     },
     /// More than any recording has.
@@ -25,9 +24,9 @@ pub enum ImportError {
     TooMuch {
         /// The file or folder.
         file: PathBuf,
-        /// What there is too much of.
+        /// What exceeds the limit.
         what: &'static str,
-        /// What is read.
+        /// The limit.
         limit: u64,
     },
     /// It takes more time, or unpacks to more, than a person has allowed.
@@ -44,15 +43,16 @@ pub enum ImportError {
     /// There is nothing that could be robot poses.
     #[error(
         "{folder}: no series of at least {need} poses was found ({formats} are read): {seen}",
-        folder = folder.display(),
-        formats = with_poses()
+        folder = folder.display()
     )]
     NoPoses {
         /// The folder that was read.
         folder: PathBuf,
         /// How many poses a calibration needs.
         need: usize,
-        /// What was found instead.
+        /// The formats with poses that are read.
+        formats: Text,
+        /// What was found instead, as text.
         seen: Text,
     },
     /// The robot was at one place all the time.
@@ -67,9 +67,9 @@ pub enum ImportError {
         folder: PathBuf,
         /// The robot's poses.
         series: String,
-        /// How many they are.
+        /// Number of poses.
         count: usize,
-        /// How far they are apart at the most, millimetres and degrees; `None` where their numbers are the same.
+        /// Largest difference between them, millimetres and degrees; `None` where their numbers are the same.
         spread_mm_deg: Option<(f64, f64)>,
     },
     /// No way to put the files together has views to solve with.
@@ -87,7 +87,7 @@ pub enum ImportError {
     /// Poses cannot be made of joint values.
     #[error("arm = {arm:?}: {why}")]
     Arm {
-        /// As it was named.
+        /// The arm as it was named.
         arm: String,
         /// What is wrong.
         why: Text,
@@ -102,14 +102,14 @@ pub enum ImportError {
         /// Why not.
         why: ClockOffsetError,
     },
-    /// A choice that is none.
+    /// An invalid choice.
     #[error("{key} = {value:?} is not a choice here: {choices}")]
     BadChoice {
         /// The convention that was set.
         key: String,
-        /// What was given.
+        /// The given value.
         value: String,
-        /// What may be given.
+        /// The valid values.
         choices: Text,
     },
     /// What was chosen excludes everything.
@@ -123,7 +123,7 @@ pub enum ImportError {
     Unwritable {
         /// The file that could not be written.
         file: PathBuf,
-        /// What the system says.
+        /// The error of the operating system.
         why: String,
     },
 }

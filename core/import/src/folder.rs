@@ -5,7 +5,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::ImportError;
-use super::formats::of_ending;
 pub(super) use super::naming::{groups, naming, shown};
 use super::recording::{ImageFile, Stream};
 use handeye_files::bounds::Bounds;
@@ -16,7 +15,7 @@ use handeye_wording::Text;
 use handeye_wording::one_line;
 use handeye_wording::text;
 
-/// Most files that are looked at.
+/// Most files that are listed.
 const MAX_FILES: usize = 20_000;
 /// Folders below the one that was named.
 const MAX_DEPTH: usize = 4;
@@ -27,12 +26,13 @@ const LEAST_IMAGES: usize = 3;
 
 const IMAGES: [&str; 6] = ["png", "jpg", "jpeg", "bmp", "tif", "tiff"];
 
-/// The files of a folder and of those in it, in natural order, as paths below it. Hidden ones are none. Of a file that was
-/// named, which comes last, it and what lies beside it.
+/// The files of a folder and of those in it, in natural order, as paths below it. Hidden ones are left out. For a named
+/// file: it, as the last one, and the files next to it that `belongs_to` accepts.
 ///
 /// Links that lead out of the bounds are not among them; they are reported in `warnings`.
 pub(super) fn list(
     path: &Path,
+    belongs_to: impl Fn(&Path, &Path) -> bool,
     bounds: &Bounds,
     budget: &Budget<'_>,
     warnings: &mut Vec<Text>,
@@ -58,7 +58,7 @@ pub(super) fn list(
     });
     if let Some(only) = &only {
         // Beside a file that was named only what it may refer to counts: images, the description of a camera.
-        files.retain(|file| file == only || of_ending(file).is_none_or(|(format, _)| format.is_beside(file, only)));
+        files.retain(|file| file == only || belongs_to(file, only));
     }
     files.sort_by(|a, b| natural_order::compare(&a.to_string_lossy(), &b.to_string_lossy()));
     Ok((root, files, only))
@@ -83,7 +83,7 @@ fn walk(
         // A link to a folder may lead in a circle, and a pipe would never end.
         let Ok(found) = entry.file_type() else { continue };
         if found.is_dir() && depth > 0 {
-            // Data sets are what imports have written, some of them beside what they were made from.
+            // Data sets are outputs of imports, some of them next to their inputs.
             if root.join(&path).join(DESCRIPTION).exists() {
                 continue;
             }
@@ -99,7 +99,7 @@ fn walk(
     Ok(())
 }
 
-/// The images in folders below the one that is named, in which poses say that they are; links lead nowhere.
+/// The images in folders below the one that is named, in which the poses name them; links are not followed.
 pub(super) fn images_below<'a>(
     root: &Path,
     names: impl Iterator<Item = &'a str>,
@@ -123,7 +123,7 @@ pub(super) fn images_below<'a>(
     };
     let mut files = Vec::new();
     for folder in folders.iter().filter(|folder| is_folder(folder)) {
-        // What cannot be listed has no images.
+        // A folder that cannot be listed has no images.
         let _left_out = walk(root, folder, 0, budget, &mut files).is_err();
     }
     files.retain(|file| is_image(file) && bounds.has(&root.join(file)));
@@ -135,7 +135,7 @@ pub(super) fn unreadable(path: &Path, error: &std::io::Error) -> ImportError {
     ImportError::Unreadable { file: path.to_path_buf(), why: one_line(error) }
 }
 
-/// How a name ends, in lower case.
+/// The ending of a name, in lower case.
 pub(super) fn ending(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
 }
@@ -154,11 +154,11 @@ pub(super) fn bytes(path: &Path) -> Result<Vec<u8>, ImportError> {
     fs::read(path).map_err(|e| unreadable(path, &e))
 }
 
-/// The text of a file; bytes that are no UTF-8 stand as signs that are no part of a number.
+/// The text of a file; bytes that are not UTF-8 become characters that are not part of a number.
 pub(super) fn text(path: &Path) -> Result<String, ImportError> {
     let bytes = bytes(path)?;
     let text = match bytes.as_slice() {
-        // What Windows calls Unicode.
+        // The encoding that Windows calls Unicode.
         [0xff, 0xfe, rest @ ..] => {
             let units = rest.chunks_exact(2).map(|c| u16::from_le_bytes([c[0], c[1]]));
             char::decode_utf16(units).map(|c| c.unwrap_or('\u{fffd}')).collect()

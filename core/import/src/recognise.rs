@@ -1,13 +1,13 @@
-//! What lies in a folder: which format each file is of, and why it is taken for that.
+//! Contents of a folder: the format of each file, and how it was recognised.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::error::ImportError;
 use super::folder;
+use super::formats::nothing;
+use super::formats::reader::Reader;
 use super::formats::{ALL, Encoding, of_ending};
-use super::nothing;
-use super::reader::Reader;
 use super::recording::{FoundCamera, FoundTarget, JointSeries, Recording, Stream, Track};
 use handeye_files::bounds::Bounds;
 use handeye_files::budget::{Budget, Limits};
@@ -16,7 +16,7 @@ use handeye_geometry::progress::CancelToken;
 use handeye_wording::Text;
 use handeye_wording::text;
 
-/// Looks at a folder, or at a file and what lies beside it, without a limit of time.
+/// Reads a folder, or a file and those next to it, without a time limit.
 ///
 /// # Errors
 /// [`ImportError`] where the folder cannot be listed, or is a data set already. A file that cannot be understood is named in
@@ -26,7 +26,7 @@ pub fn open(path: &Path) -> Result<Recording, ImportError> {
     open_within(path, &Bounds::ANYWHERE, &Budget::new(Limits::default(), &|| Duration::ZERO, &cancel))
 }
 
-/// As [`open`], where files may name only what is in `bounds`, and reading is stopped where the budget is spent.
+/// As [`open`], where files may name only what is in `bounds`, and reading stops when the budget is spent.
 ///
 /// # Errors
 /// As [`open`], and [`ImportError::Stopped`].
@@ -36,7 +36,9 @@ pub fn open_within(path: &Path, bounds: &Bounds, budget: &Budget<'_>) -> Result<
         return Err(ImportError::AlreadyADataset(path.to_path_buf()));
     }
     let mut recording = Recording { bounds: bounds.clone(), ..Recording::default() };
-    let (root, files, named) = folder::list(path, bounds, budget, &mut recording.warnings)?;
+    let belongs_to =
+        |file: &Path, named: &Path| of_ending(file).is_none_or(|(format, _)| format.is_beside(file, named));
+    let (root, files, named) = folder::list(path, belongs_to, bounds, budget, &mut recording.warnings)?;
     recording.root.clone_from(&root);
     recording.streams = folder::streams(&root, &files, budget, &mut recording.warnings);
     budget.check().map_err(stopped)?;

@@ -1,4 +1,4 @@
-//! What a person fixes with `--set`.
+//! Choices of the user with `--set`.
 
 use super::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
 use super::error::ImportError;
@@ -40,7 +40,7 @@ pub const KEYS: &str = "  mode=eye_in_hand|eye_to_hand
           of the images that recorded corners are from, in pixels, where no
           file says it
   joint_unit=rad|deg
-          takes over the joint values that stand with the poses
+          takes over the joint values that are recorded with the poses
   clock_offset=SECONDS
           what is added to stamps of images to have them by the robot's clock,
           roughly, where the clocks of a bag are apart by more than 2 s
@@ -51,39 +51,39 @@ pub const KEYS: &str = "  mode=eye_in_hand|eye_to_hand
 /// Choices that were made; `None` where all are tried.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Settings {
-    /// Where the camera sits.
+    /// Where the camera is mounted.
     pub mode: Option<Mode>,
-    /// Of the robot's poses.
+    /// Length unit of the robot's poses.
     pub length: Option<LengthUnit>,
-    /// Of the robot's poses.
+    /// Angle unit of the robot's poses.
     pub angle: Option<AngleUnit>,
-    /// Of the robot's poses.
+    /// Rotation convention of the robot's poses.
     pub rotation: Option<RotationForm>,
-    /// Of the robot's poses.
+    /// Direction of the robot's poses.
     pub direction: Option<Direction>,
-    /// By its rule.
+    /// The pairing, by its rule.
     pub pairing: Option<String>,
-    /// By their name.
+    /// The stream of images, by its name.
     pub images: Option<String>,
-    /// By its name.
+    /// The series of the robot, by its name.
     pub poses: Option<String>,
-    /// By its name.
+    /// The series of the target, by its name.
     pub target_poses: Option<String>,
-    /// Of the target's poses.
+    /// Direction of the target's poses.
     pub target_direction: Option<Direction>,
-    /// Of the target's poses.
+    /// Length unit of the target's poses.
     pub target_length: Option<LengthUnit>,
-    /// Of the target's poses.
+    /// Rotation convention of the target's poses.
     pub target_rotation: Option<RotationForm>,
-    /// By its file; `none` for no camera.
+    /// The camera, by its file; `none` for no camera.
     pub camera: Option<String>,
     /// Width and height in pixels of the images that recorded corners are from.
     pub image_size: Option<(u32, u32)>,
-    /// Of the joint values, which are taken over when it is given.
+    /// Unit of the joint values, which are only used when it is given.
     pub joint_unit: Option<AngleUnit>,
     /// About what is added to stamps of images to have them by the robot's clock, seconds.
     pub clock_offset_s: Option<f64>,
-    /// The arm that makes poses of joint values, as [`with_arm`](super::with_arm) has it.
+    /// The arm that converts joint values to poses, in the notation of [`with_arm`](super::with_arm).
     pub arm: Option<String>,
 }
 
@@ -91,7 +91,7 @@ impl Settings {
     /// Takes `KEY=VALUE`.
     ///
     /// # Errors
-    /// [`ImportError::BadChoice`] for a key or a value that is none.
+    /// [`ImportError::BadChoice`] for an unknown key or an invalid value.
     pub fn set(&mut self, assignment: &str) -> Result<(), ImportError> {
         let (key, value) = assignment.split_once('=').unwrap_or((assignment, ""));
         let bad = |choices: Text| ImportError::BadChoice { key: key.to_owned(), value: value.to_owned(), choices };

@@ -16,11 +16,9 @@ use handeye_wording::one_line;
 pub struct ResultError {
     /// The file that was read or written.
     pub file: PathBuf,
-    /// What is wrong.
+    /// The error.
     pub problem: ResultProblem,
 }
-
-impl ResultError {}
 
 /// What is wrong with a result.
 #[derive(Debug, thiserror::Error, handeye_wording::Localized)]

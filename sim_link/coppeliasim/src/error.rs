@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use handeye_arm::JointQuantity;
 
-use super::cell::{CellPart, version_name};
+use super::cell::CellPart;
 use super::convert::ConvertError;
 use super::endpoint::{BadEndpoint, Endpoint};
 use super::sim::SimulationState;
@@ -12,7 +12,7 @@ use handeye_wire::{MAX_MESSAGE_BYTES, MAX_REPLY_BYTES, WireError};
 use handeye_wording::Text;
 use handeye_wording::text;
 
-/// Why a call, or a task made of calls, has no result. Each message says what to do next.
+/// Why a call, or a task made of calls, has no result. Each message states what to do next.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum LinkError {
@@ -22,9 +22,9 @@ pub enum LinkError {
     /// The operating system or the socket library refused.
     #[error("no socket to {endpoint}: {reason}; check the address and the number of open files of this process")]
     Socket {
-        /// Where to.
+        /// The address.
         endpoint: String,
-        /// What the library said.
+        /// The error of the library.
         reason: String,
     },
     /// Nothing that speaks ZeroMQ accepted a connection.
@@ -35,9 +35,9 @@ pub enum LinkError {
     Unreachable {
         /// The call of the remote API, for example `sim.getObject`.
         call: String,
-        /// Where to.
+        /// The address.
         endpoint: Endpoint,
-        /// How long was waited.
+        /// How long it waited.
         after: Duration,
     },
     /// The server accepted the connection but did not answer in time.
@@ -48,7 +48,7 @@ pub enum LinkError {
     Timeout {
         /// The call of the remote API, for example `sim.getObject`.
         call: String,
-        /// How long was waited.
+        /// How long it waited.
         after: Duration,
     },
     /// The server answers, but no pass of the simulation begins although it runs.
@@ -57,7 +57,7 @@ pub enum LinkError {
          lock; let that client go on or end it, then try again"
     )]
     Held {
-        /// How long was waited.
+        /// How long it waited.
         after: Duration,
     },
     /// The connection was lost while the call was under way; whether it had an effect is not known.
@@ -71,7 +71,7 @@ pub enum LinkError {
     OwnCellSilent {
         /// The call of the remote API, for example `sim.getObject`.
         call: String,
-        /// How long was waited.
+        /// How long it waited.
         after: Duration,
     },
     /// The cell in this process has ended before the program did.
@@ -116,7 +116,7 @@ pub enum LinkError {
     ReplyTooLarge {
         /// The call of the remote API, for example `sim.getObject`.
         call: String,
-        /// Its length; `None` when it was so long that it was not read to its end.
+        /// Its length; `None` when it was too long to be read to its end.
         bytes: Option<usize>,
     },
     /// The reply is a message, but not one that the call can have.
@@ -126,10 +126,10 @@ pub enum LinkError {
         call: String,
         /// What was expected.
         expected: String,
-        /// What came.
+        /// What was received.
         got: String,
     },
-    /// The reply has the right shape but a value that means nothing.
+    /// The reply has the right shape but an invalid value.
     #[error("{call}: {source}; check the object in the scene")]
     BadValue {
         /// The call of the remote API, for example `sim.getObject`.
@@ -140,7 +140,7 @@ pub enum LinkError {
     /// The server is older than everything that is supported.
     #[error("this is CoppeliaSim {version}, and 4.7 or newer is needed: update CoppeliaSim", version = too_old(*version))]
     TooOld {
-        /// Its version, 40600 is 4.6.0; `None` where it speaks a protocol that ended with 4.5.
+        /// Its version, 40600 is 4.6.0; `None` for a server with the protocol that ended with 4.5.
         version: Option<i64>,
     },
     /// The server lacks the call.
@@ -148,7 +148,7 @@ pub enum LinkError {
     Unsupported {
         /// The call of the remote API, for example `sim.getObject`.
         call: String,
-        /// What has it.
+        /// The server that has the call.
         needs: &'static str,
     },
     /// The scene lacks an object.
@@ -159,9 +159,9 @@ pub enum LinkError {
         key = part.key()
     )]
     NoSuchObject {
-        /// The path asked for.
+        /// The requested path.
         path: String,
-        /// What of the cell was looked for at that path.
+        /// The part of the cell that was looked for at that path.
         part: CellPart,
         /// Paths of objects of that kind that the scene has.
         there: Vec<String>,
@@ -191,9 +191,9 @@ pub enum LinkError {
          time does not go on"
     )]
     WaitedTooLong {
-        /// What was asked for.
+        /// The requested task.
         task: &'static str,
-        /// What was waited for.
+        /// What it waited for.
         awaited: String,
         /// How long, in real time.
         after: Duration,
@@ -201,7 +201,7 @@ pub enum LinkError {
     /// The simulation does not run, so nothing would move and no image would be new.
     #[error("{task}: the simulation is {state}", state = standing(*state))]
     NotRunning {
-        /// What was asked for.
+        /// The requested task.
         task: &'static str,
         /// Paused or stopped.
         state: SimulationState,
@@ -211,7 +211,7 @@ pub enum LinkError {
     JointOutOfRange {
         /// Which joint, counted from 1 at the base.
         joint: usize,
-        /// Where it should go.
+        /// Its goal.
         goal: JointQuantity,
         /// Lower end of its range.
         min: JointQuantity,
@@ -255,10 +255,10 @@ pub enum LinkError {
         /// The call of the remote API, for example `sim.getObject`.
         call: String,
     },
-    /// Somebody else stopped the motion, and the arm stands.
+    /// Somebody else stopped the motion, and the arm is at rest.
     #[error("{task}: the motion was stopped on its way, perhaps by another client; move again when it is clear")]
     MotionStopped {
-        /// What was asked for.
+        /// The requested task.
         task: &'static str,
     },
     /// A joint is not where a motion has put it.
@@ -269,15 +269,15 @@ pub enum LinkError {
     JointElsewhere {
         /// Which joint, counted from 1 at the base.
         joint: usize,
-        /// Where it is.
+        /// Its position.
         at: JointQuantity,
-        /// Where it should be.
+        /// Its goal.
         goal: JointQuantity,
     },
     /// The arm would come nearer to something on its way than it may; nothing was moved.
     #[error("nothing was moved: {contact}")]
     InTheWay {
-        /// What would be touched.
+        /// The contact that the motion would cause.
         contact: handeye_plan::Contact,
     },
     /// No motion fits the limits.
@@ -311,10 +311,10 @@ pub enum LinkError {
          when it is done"
     )]
     MixedInstants {
-        /// How often it was tried.
+        /// Number of attempts.
         attempts: u32,
     },
-    /// What the cell publishes about itself cannot be read.
+    /// The ground truth that the cell publishes cannot be read.
     #[error("the cell publishes a ground truth that cannot be read: {reason}")]
     BadTruth {
         /// What is wrong with it.
@@ -324,7 +324,7 @@ pub enum LinkError {
 
 impl LinkError {
     /// Whether the conversation itself broke, so that nothing is known about the server's state: worth a new try or a
-    /// reconnection, in contrast to an answer that says no.
+    /// reconnection, in contrast to a refusal.
     pub fn is_connection_loss(&self) -> bool {
         matches!(
             self,
@@ -339,7 +339,7 @@ impl LinkError {
         )
     }
 
-    /// Whether the server said that the scene has no such object.
+    /// Whether the server reported that the scene has no such object.
     pub(crate) fn is_missing_object(&self) -> bool {
         matches!(self, Self::Remote { message, .. } if message.to_lowercase().contains(super::protocol::NO_SUCH_OBJECT))
     }
@@ -357,14 +357,14 @@ impl LinkError {
         }
     }
 
-    /// Whether the server said that it has no such function.
+    /// Whether the server reported that it has no such function.
     pub(crate) fn is_unknown_function(&self) -> bool {
         matches!(self, Self::Remote { message, .. } if message.contains(super::protocol::UNKNOWN_FUNCTION))
     }
 }
 
-/// What Lua says without the line of the server's code where it was found out, as in `lua/motion.lua:17: missing field`
-/// or `939: in sim.getObject: …`. Whoever reads it cannot do anything about that line.
+/// A Lua error message without the line of the server's code that raised it, as in `lua/motion.lua:17: missing field`
+/// or `939: in sim.getObject: …`. That line does not help the user.
 fn without_place(message: &str) -> &str {
     let Some((place, what)) = message.split_once(": ") else { return message };
     let line = place.rsplit(':').next().unwrap_or(place);
@@ -372,7 +372,7 @@ fn without_place(message: &str) -> &str {
     if is_line { what } else { message }
 }
 
-/// What of that kind the scene has.
+/// The objects of that kind in the scene.
 fn listed(part: CellPart, there: &[String]) -> Text {
     if there.is_empty() {
         return Text::default();
@@ -386,6 +386,11 @@ fn too_old(version: Option<i64>) -> Text {
         Some(version) => Text::verbatim(version_name(version)),
         None => text!("4.5 or older"),
     }
+}
+
+/// A version as text: 41000 is 4.10.0.
+pub fn version_name(version: i64) -> String {
+    format!("{}.{}.{}", version / 10_000, version / 100 % 100, version % 100)
 }
 
 fn standing(state: SimulationState) -> Text {

@@ -6,7 +6,7 @@
 //! | [`Cell`], [`ControlPort`], [`CameraPort`], [`MotionPort`] | what can be asked of a cell, by three connections that do not wait for each other |
 //! | [`RemoteCell`] | the remote API of CoppeliaSim; starts the built-in cell where that is the one |
 //! | [`DrivenCell`] | [drivers](handeye_driver) of robot and camera |
-//! | [`limits`] | how fast the arm moves when nobody says otherwise |
+//! | [`limits`] | default speeds of the arm |
 //!
 //! ```no_run
 //! use handeye_coppeliasim::{CancelToken, cell::CellPaths};
@@ -22,7 +22,7 @@
 //! # Ok::<(), handeye_link::PortError>(())
 //! ```
 //!
-//! Never depends on a window, an estimator of its own, or a session.
+//! Never depends on a window, its own estimator, or a session.
 
 #![warn(missing_docs)]
 
@@ -35,7 +35,7 @@ mod port;
 mod remote;
 mod source;
 
-pub use drivers::DrivenCell;
+pub use drivers::{DrivenCell, Drivers};
 pub use facts::{ArmDoubt, CellFacts, JointFacts, Moves, RobotState, Simulation, Truth};
 pub use goal::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome};
 pub use moved::moved_text;
@@ -43,4 +43,4 @@ pub use port::{
     CameraPort, Cell, Connected, ControlPort, JogRequest, MotionPort, Newest, PortError, RawFrame, Room, ViewsRequest,
 };
 pub use remote::{RemoteCell, end_of_following};
-pub use source::{CellSource, Drivers};
+pub use source::CellSource;

@@ -1,22 +1,22 @@
-//! Which cell is worked with.
+//! The cell of the workbench.
 
-use std::fmt;
 use std::sync::Arc;
 
 use handeye_cell::scene::{ArmErrorsSpec, SceneChoice};
 use handeye_coppeliasim::cell::CellPaths;
 use serde::{Deserialize, Serialize};
 
-use crate::{Cell, DrivenCell, RemoteCell};
+use crate::drivers::{DrivenCell, Drivers};
+use crate::{Cell, RemoteCell};
 
-/// Which cell is worked with.
+/// The cell of the workbench.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub enum CellSource {
     /// The cell inside this program, started by it, with this scene.
     BuiltIn(SceneChoice),
     /// A server that runs already.
     Address(String),
-    /// Programs that speak the driver protocol.
+    /// Programs with the driver protocol.
     Drivers(Drivers),
 }
 
@@ -44,23 +44,5 @@ impl CellSource {
 impl Default for CellSource {
     fn default() -> Self {
         Self::BuiltIn(SceneChoice::default())
-    }
-}
-
-/// Commands or addresses of drivers. Without one for the robot a person types its poses.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Drivers {
-    /// The robot's, which may have the images, too.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub robot: Option<String>,
-    /// The camera's, where it is another program.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub camera: Option<String>,
-}
-
-impl fmt::Display for Drivers {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let named: Vec<&str> = self.robot.iter().chain(&self.camera).map(String::as_str).collect();
-        f.write_str(&named.join(" + "))
     }
 }

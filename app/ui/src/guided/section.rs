@@ -1,4 +1,4 @@
-//! The button that begins, and what is under way.
+//! The start button, and what is under way.
 
 use egui::{Button, RichText, Spinner, Ui, Vec2};
 use handeye_estimate::diagnose::{Promise, Promised};
@@ -15,9 +15,9 @@ use handeye_workbench::guided::state::{GuidedProgress, Waits};
 use handeye_workbench::model::{Model, Motion, Pane, PoseSequence};
 use handeye_workbench::text::Text;
 use handeye_workbench::tr;
-use handeye_workbench::{guided, motion, taught};
+use handeye_workbench::{guided, taught};
 
-/// The button, where nothing is under way.
+/// The button, if nothing is under way.
 pub fn begin_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, height: f32, outbox: &mut Outbox) {
     if !model.takes_chosen_poses() {
         return;
@@ -65,14 +65,14 @@ fn hindered(model: &Model) -> Option<&'static str> {
         .or_else(|| is_moving.then(|| tr!(model.view.language, "The arm is moving: wait until it stands, or stop it")))
 }
 
-/// Whether there is more to reach: no captures yet, or an answer that is not below the goal.
+/// Whether there is more to do: no captures yet, or an answer that is not below the goal.
 pub fn is_wanted(model: &Model) -> bool {
     let goal_m = model.view.goal.0;
     let promised = model.solve.solved.as_ref().and_then(|solved| solved.promised(goal_m));
     model.document().captures.is_empty() || promised.is_none_or(|promised| promised.error_m > goal_m)
 }
 
-/// Why it cannot begin.
+/// Why it cannot start.
 pub fn blocked(model: &Model, hindrance: Option<&'static str>) -> Option<&'static str> {
     let unseen = || {
         let what =
@@ -82,7 +82,7 @@ pub fn blocked(model: &Model, hindrance: Option<&'static str>) -> Option<&'stati
     hindrance.or_else(|| hindered(model)).or_else(unseen)
 }
 
-/// How far it is and why the arm goes where it goes; afterwards, how it ended.
+/// The progress and the reason for the present pose; afterwards, how it ended.
 pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &mut Outbox) {
     let language = model.view.language;
     let Some(guided) = sequence.guided.as_deref() else { return };
@@ -113,7 +113,7 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: 
     confirm_moves_ui(ui, model, outbox);
 }
 
-/// Whether moves wait to be confirmed; switched on while the arm is on its way, it holds before the next pose.
+/// Whether moves wait to be confirmed; switched on while the arm is moving, it takes effect before the next pose.
 pub fn confirm_moves_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     let mut confirm = model.confirms_moves();
@@ -123,7 +123,7 @@ pub fn confirm_moves_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
          switched at any time"
     );
     if ui.checkbox(&mut confirm, tr!(language, "Confirm each move")).on_hover_text(what).changed() {
-        outbox.send(motion::Command::SetConfirmMoves(confirm));
+        outbox.send(taught::Command::SetConfirmMoves(confirm));
     }
 }
 
@@ -132,13 +132,13 @@ fn left(model: &Model, sequence: &PoseSequence, guided: &GuidedProgress) -> Opti
     let poses = guided.views_left.filter(|poses| *poses > 0)?;
     let (since_s, before) = guided.since;
     let done = sequence.outcomes.len().saturating_sub(before);
-    // A pace that has people in it is none, and two poses are no pace.
+    // A pace that includes waiting for the user is meaningless, and two poses are too few.
     if model.confirms_moves() || done < 2 {
         return Some(text!("about {n} more {n|pose|poses}", n = poses));
     }
     let pose_s = (model.now_s - since_s) / done as f64;
     let left_s = pose_s * (poses + CHECKS) as f64;
-    // No finer than it is known.
+    // Not more precise than it is known.
     let seconds = format!("{:.0}", (left_s / 10.0).ceil() * 10.0);
     Some(text!("about {n} more {n|pose|poses}, {seconds} s with the checks", n = poses, seconds = seconds))
 }
@@ -160,7 +160,7 @@ pub fn under_way(model: &Model, sequence: &PoseSequence, guided: &GuidedProgress
     }
 }
 
-/// The error beside the goal, and what is left; nothing before there is an error.
+/// The error next to the goal, and what is left; nothing before there is an error.
 pub fn error_ui(ui: &mut Ui, model: &Model, guide: &Guide, left: Option<Text>) {
     let language = model.view.language;
     let goal_m = guide.options().goal_m;

@@ -16,7 +16,7 @@ use handeye_workbench::model::{
 use handeye_workbench::taught::update::reference_poses;
 use handeye_workbench::testing::sample;
 use handeye_workbench::text::{Language, Text};
-use handeye_workbench::{guided, motion, taught};
+use handeye_workbench::{guided, taught};
 
 const BUTTON: &str = "Calibrate for me";
 const FOREIGN: ArmDoubt = ArmDoubt::Foreign { distance_m: 0.074, angle_rad: 0.1 };
@@ -139,7 +139,7 @@ fn what_is_under_way_and_why_stands_in_the_pane() {
     assert!(self::pane(checking).sees("Check 1 of 3"));
 }
 
-/// The goal is judged over the box that was chosen for the expected error, so that is what stands beside it.
+/// The goal is judged over the box that was chosen for the expected error, so that error is shown next to it.
 #[test]
 fn the_error_over_a_box_that_was_chosen_stands_beside_the_goal() {
     let mut model = under_way(Waits::Nothing, None);
@@ -180,11 +180,11 @@ fn a_person_lets_the_arm_move_or_has_another_pose_chosen() {
     model.source = CellSource::Address("tcp://10.0.0.2:23000".to_owned());
     let mut waiting = pane(model.clone());
     assert!(waiting.sees("Pose 2 waits for you"));
-    assert_eq!(waiting.click("Move there"), [Command::Motion(motion::Command::ConfirmMove)]);
-    assert_eq!(waiting.click("Skip this pose"), [Command::Motion(motion::Command::SkipMove)]);
+    assert_eq!(waiting.click("Move there"), [Command::Taught(taught::Command::ConfirmMove)]);
+    assert_eq!(waiting.click("Skip this pose"), [Command::Taught(taught::Command::SkipMove)]);
     assert_eq!(
         waiting.click("Confirm each move"),
-        [Command::Motion(motion::Command::SetConfirmMoves(false))],
+        [Command::Taught(taught::Command::SetConfirmMoves(false))],
         "on behind an address"
     );
     assert!(waiting.nothing_is_cut_off());

@@ -1,4 +1,4 @@
-//! The move that waits until a person lets the arm go.
+//! The move that waits until the user allows it.
 
 use egui::{Button, RichText, Ui};
 
@@ -9,11 +9,11 @@ use crate::style::theme::{Palette, Tone};
 use handeye_wording::text;
 use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Model, Motion};
-use handeye_workbench::motion;
 use handeye_workbench::motion::way::Way;
+use handeye_workbench::taught;
 use handeye_workbench::tr;
 
-/// What it is, how far it is, and what a person may do with it; nothing where none waits.
+/// What it is, how far it is, and what the user can do with it; nothing if no move waits.
 pub fn asked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let Some(asked) = &model.asked else { return };
     let language = model.view.language;
@@ -31,7 +31,7 @@ pub fn asked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let button = Button::new(words).fill(Palette::of(ui).accent);
         let what = tr!(language, "The path is clear of all known obstacles. STOP ends the move");
         if parts::gated_ui(ui, hindrance, button).on_hover_text(what).clicked() {
-            outbox.send(motion::Command::ConfirmMove);
+            outbox.send(taught::Command::ConfirmMove);
         }
         let (name, what) = if model.sequence_runs {
             (
@@ -42,7 +42,7 @@ pub fn asked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             (tr!(language, "Do not move"), tr!(language, "The arm stays where it is"))
         };
         if ui.button(name).on_hover_text(what).clicked() {
-            outbox.send(motion::Command::SkipMove);
+            outbox.send(taught::Command::SkipMove);
         }
     });
 }

@@ -1,9 +1,22 @@
 //! What the handlers of features work on.
 
-use crate::app::Connect;
-use crate::model::{JobId, Model, MotionId};
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use handeye_coppeliasim::cell::CellPaths;
+use handeye_link::{Cell, CellSource};
+
+use crate::command::Event;
+use crate::model::Model;
+use crate::motion::state::MotionId;
+use crate::session::desk::SessionThreads;
 use crate::solve::question::Question;
-use crate::worker::{Clock, SessionThreads, Waker, Workers};
+use crate::solve::state::JobId;
+use crate::worker::shared::{Clock, Waker};
+use crate::worker::threads::Workers;
+
+/// Makes what connects to a cell.
+pub type Connect = Arc<dyn Fn(&CellSource, &CellPaths) -> Arc<dyn Cell> + Send + Sync>;
 
 /// The model and what works for it. A handler takes only the parts that it needs, so that its signature shows what it can
 /// change and whom it can ask; it takes all of it where it lets other features continue.
@@ -13,6 +26,15 @@ pub(crate) struct Context {
     pub(crate) workers: Workers,
     pub(crate) desk: SessionThreads,
     pub(crate) numbers: Numbers,
+    /// Events that handlers report themselves; they are taken in next.
+    pub(crate) reported: VecDeque<Event>,
+}
+
+impl Context {
+    /// Has an event taken in as soon as the present command or event is done.
+    pub(crate) fn report(&mut self, event: impl Into<Event>) {
+        self.reported.push_back(event.into());
+    }
 }
 
 /// What a connection is started with.

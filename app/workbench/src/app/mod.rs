@@ -4,10 +4,12 @@
 //! concerned, whose `update` changes the model and passes work to threads; a feature can reach only what it is given here.
 //! None of them waits.
 
-mod context;
+pub(crate) mod context;
+mod follow_up;
 mod leave;
-mod reach;
+pub(crate) mod reach;
 
+use std::collections::VecDeque;
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -19,26 +21,31 @@ use crate::by_hand::update::guided_by_hand_step;
 use crate::command::{Command, Event};
 use crate::guided::update::guided_step;
 use crate::keep_out::update::{keep_keep_out, send_keep_out};
-use crate::model::{CellSource, Drivers, Model, Severity, ViewSettings};
+use crate::messages::state::Severity;
+use crate::model::Model;
 use crate::motion::rest::{stop_requested, stop_waits};
+use crate::motion::stop_line::StopLine;
 use crate::recording::Recording;
 use crate::recording::recorded::Recorded;
 use crate::scene::update::fit_scene;
-use crate::session::update::{open_or_begin, prepare_session, send_target};
+use crate::session::desk::SessionThreads;
+use crate::session::requests::send_target;
+use crate::session::update::{open_or_begin, prepare_session};
 use crate::settings::SettingsWrite;
-use crate::worker::{Cell, Clock, FileTask, SessionThreads, StopLine, Waker, Workers};
+use crate::shell::view::ViewSettings;
+use crate::worker::files::FileTask;
+use crate::worker::shared::{Clock, Waker};
+use crate::worker::threads::Workers;
 use crate::{
     by_hand, capture, connect, export, guided, import, keep_out, live, messages, motion, recording, scene, session,
     shell, solve, target, taught, track,
 };
+use handeye_link::{CellSource, Drivers};
 use handeye_wording::text;
 
+pub use context::Connect;
 pub(crate) use context::{Connector, Context, Numbers};
 pub use reach::Reach;
-pub(crate) use reach::bounds_of;
-
-/// Makes what connects to a cell.
-pub type Connect = Arc<dyn Fn(&CellSource, &CellPaths) -> Arc<dyn Cell> + Send + Sync>;
 
 /// What an application starts with.
 pub struct Start {
@@ -102,7 +109,7 @@ impl App {
         let (keep_out, fault) = crate::keep_out::update::opened(keep_out);
         let model = Model { keep_out, ..model };
         let mut app = Self {
-            cx: Context { model, workers, desk, numbers: Numbers::default() },
+            cx: Context { model, workers, desk, numbers: Numbers::default(), reported: VecDeque::new() },
             connector: Connector { connect, clock, waker },
             recording: None,
             recorded: Recorded::default(),
@@ -184,13 +191,17 @@ impl App {
 
     /// Does what the user wants, or has a worker do it. Never waits for a worker.
     pub fn apply(&mut self, command: impl Into<Command>) {
-        let command = command.into();
+        self.hand_on(command.into());
+        self.absorb_reported();
+    }
+
+    fn hand_on(&mut self, command: Command) {
         let Self { cx, connector, recording, reach, .. } = self;
         let reach = reach.as_ref();
         if let Some(why) = reach.and_then(|reach| reach.refusal(&command)) {
             return cx.model.notify(Severity::Warning, why);
         }
-        let Context { model, workers, desk, numbers } = cx;
+        let Context { model, workers, desk, numbers, .. } = cx;
         match command {
             Command::ByHand(command) => by_hand::update::apply(cx, command),
             Command::Capture(command) => capture::update::apply(model, workers, numbers, command),
@@ -215,12 +226,23 @@ impl App {
 
     /// Takes in what happened.
     pub fn absorb(&mut self, event: impl Into<Event>) {
-        let event = event.into();
+        self.take_in(event.into());
+        self.absorb_reported();
+    }
+
+    /// Takes in what handlers have reported themselves, and what follows from that.
+    fn absorb_reported(&mut self) {
+        while let Some(event) = self.cx.reported.pop_front() {
+            self.take_in(event);
+        }
+    }
+
+    fn take_in(&mut self, event: Event) {
         let Self { cx, recording, reach, .. } = self;
         if let Some(recording) = recording {
             recording::update::note(recording.as_ref(), &cx.model, &cx.numbers, &event);
         }
-        let Context { model, workers, desk, numbers } = cx;
+        let Context { model, workers, desk, numbers, .. } = cx;
         match event {
             Event::Tick { now_s } => {
                 model.now_s = now_s;
@@ -228,7 +250,11 @@ impl App {
                 stop_waits(model);
             }
             Event::ByHand(event) => by_hand::update::absorb(model, numbers, event),
-            Event::Capture(event) => capture::update::absorb(cx, event),
+            Event::Capture(event) => {
+                if let Some(ended) = capture::update::absorb(model, event) {
+                    follow_up::capture_ended(cx, ended);
+                }
+            }
             Event::Connect(event) => connect::update::absorb(cx, event),
             Event::Export(event) => export::update::absorb(model, event),
             Event::Guided(event) => guided::update::absorb(cx, event),
@@ -236,14 +262,18 @@ impl App {
             Event::KeepOut(event) => keep_out::update::absorb(model, workers, event),
             Event::Live(event) => live::update::absorb(model, workers, numbers, event),
             Event::Messages(event) => messages::update::absorb(model, event),
-            Event::Motion(event) => motion::update::absorb(cx, event),
+            Event::Motion(event) => {
+                if let Some(ended) = motion::update::absorb(cx, event) {
+                    follow_up::motion_ended(cx, ended);
+                }
+            }
             Event::Recording(event) => recording::update::absorb(model, desk, event),
             Event::Session(event) => session::update::absorb(cx, event),
             Event::Solve(event) => solve::update::absorb(cx, event),
             Event::Taught(event) => taught::update::absorb(cx, event),
             Event::Track(event) => track::update::absorb(model, workers, numbers, event),
         }
-        let Context { model, workers, desk, numbers } = cx;
+        let Context { model, workers, desk, numbers, .. } = cx;
         guided_step(model, workers, numbers);
         guided_by_hand_step(model, desk, numbers);
         fit_scene(model);

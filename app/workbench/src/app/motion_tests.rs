@@ -80,13 +80,13 @@ fn the_first_move_of_a_sequence_is_asked_for_wherever_there_may_be_a_real_arm() 
     let app = &mut bench.app;
     app.replace_model(taught_at(driver()));
     // Whoever switched this off did so for moves that were previewed.
-    app.apply(motion::Command::SetConfirmMoves(false));
+    app.apply(taught::Command::SetConfirmMoves(false));
     app.apply(taught::Command::RunSequence { purpose: None });
     let asked = app.model().asked.clone().expect("the first move waits");
     assert_eq!(app.model().motion, Motion::Idle);
     assert_eq!(asked.what.in_language(Language::English), "pose left");
 
-    app.apply(motion::Command::ConfirmMove);
+    app.apply(taught::Command::ConfirmMove);
     assert!(matches!(app.model().motion, Motion::Moving { .. }));
     let id = app.cx.numbers.motion;
     app.absorb(motion::Event::Moved { id, outcome: MotionOutcome::Arrived });
@@ -98,11 +98,11 @@ fn the_first_move_of_a_sequence_is_asked_for_wherever_there_may_be_a_real_arm() 
     assert!(app.model().asked.is_some(), "whatever happened meanwhile");
     app.apply(motion::Command::Stop);
     assert_eq!(app.model().asked, None);
-    app.apply(motion::Command::ConfirmMove);
+    app.apply(taught::Command::ConfirmMove);
     assert!(!app.model().sequence_runs, "nothing begins after a stop");
 
     app.apply(taught::Command::RunSequence { purpose: None });
-    app.apply(motion::Command::SkipMove);
+    app.apply(taught::Command::SkipMove);
     let sequence = app.model().sequence.as_ref().expect("a sequence");
     assert!(matches!(sequence.outcomes[..], [StopOutcome::Skipped(_)]));
     assert!(app.model().asked.is_some(), "the next one is asked for instead");
@@ -134,13 +134,13 @@ fn poses_to_verify_at_and_moves_to_a_place_by_its_name_are_asked_for_as_well() {
     let way = crate::motion::way::Way::to(&asked.goal, app.model()).expect("connected");
     assert!(way.joint.is_some_and(|(joint, far)| joint == 0 && (far - 0.7).abs() < 1e-9));
     assert!(way.text(app.model()).in_language(Language::English).contains("the joint that moves most is J1, by 40.1°"));
-    app.apply(motion::Command::SkipMove);
+    app.apply(taught::Command::SkipMove);
     assert_eq!((&app.model().motion, &app.model().asked), (&Motion::Idle, &None));
 
     let first = app.model().document().captures[0].id;
     app.apply(motion::Command::GoToCapture(first));
     assert!(app.model().asked.is_some());
-    app.apply(motion::Command::ConfirmMove);
+    app.apply(taught::Command::ConfirmMove);
     assert!(matches!(app.model().motion, Motion::Moving { .. }));
 }
 
@@ -152,7 +152,7 @@ fn a_built_in_cell_asks_nothing_unless_somebody_wants_it() {
     app.apply(taught::Command::RunSequence { purpose: None });
     assert!(matches!(app.model().motion, Motion::Moving { .. }));
     app.apply(motion::Command::Stop);
-    app.apply(motion::Command::SetConfirmMoves(true));
+    app.apply(taught::Command::SetConfirmMoves(true));
     app.apply(taught::Command::RunSequence { purpose: None });
     assert!(app.model().asked.is_some());
 }

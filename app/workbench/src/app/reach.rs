@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use handeye_files::bounds::Bounds;
 
 use crate::command::Command;
-use crate::model::{CellSource, Drivers};
 use crate::text::Text;
 use crate::{connect, export, keep_out, session, taught};
+use handeye_link::{CellSource, Drivers};
 use handeye_wording::text;
 
 /// Folders that are read and written for browsers, and programs that are started for them.

@@ -29,6 +29,7 @@ use crate::worker::fake::{FakeCell, FakeMotions};
 use crate::{capture, connect, guided, live, motion, recording, scene, session, shell, solve, taught, track};
 use handeye_cell::scene::{SceneChoice, ShippedScene};
 use handeye_coppeliasim::cell::ArmKinematics;
+use handeye_link::Cell;
 
 pub(super) struct Bench {
     pub app: App,
@@ -324,16 +325,16 @@ fn a_chosen_pose_waits_for_a_person_wherever_there_may_be_a_real_arm() {
     assert!(app.model().asked.is_some());
     assert_eq!(app.model().motion, Motion::Idle);
 
-    app.apply(motion::Command::SkipMove);
+    app.apply(taught::Command::SkipMove);
     assert!(app.model().asked.is_none() && waits(app) != Some(Waits::Nothing), "another one is chosen");
     assert_eq!(app.model().motion, Motion::Idle);
 
     choose(app);
-    app.apply(motion::Command::ConfirmMove);
+    app.apply(taught::Command::ConfirmMove);
     assert!(matches!(app.model().motion, Motion::Moving { .. }));
     app.apply(motion::Command::Stop);
     assert!(!app.model().sequence_runs);
-    app.apply(motion::Command::ConfirmMove);
+    app.apply(taught::Command::ConfirmMove);
     assert!(!app.model().sequence_runs, "nothing begins after a stop");
 }
 
@@ -366,7 +367,7 @@ fn an_arm_that_was_moved_meanwhile_does_not_go_where_it_was_let() {
     let mut bench = bench(&FakeCell::new(0));
     let app = &mut bench.app;
     app.replace_model(sample::solved());
-    app.apply(motion::Command::SetConfirmMoves(true));
+    app.apply(taught::Command::SetConfirmMoves(true));
     app.apply(guided::Command::CalibrateForMe);
     choose(app);
     let mut robot = app.model().robot.clone().expect("connected");
@@ -374,12 +375,12 @@ fn an_arm_that_was_moved_meanwhile_does_not_go_where_it_was_let() {
     joints[0] += 0.02;
     robot.joints_rad = JointValues::try_from(&joints[..]).expect("six");
     app.absorb(connect::Event::Robot(robot));
-    app.apply(motion::Command::ConfirmMove);
+    app.apply(taught::Command::ConfirmMove);
     assert_eq!(app.model().motion, Motion::Idle);
     assert!(reported(app).contains("elsewhere"), "{}", reported(app));
     // Without confirmation the waiting one starts at once.
     choose(app);
-    app.apply(motion::Command::SetConfirmMoves(false));
+    app.apply(taught::Command::SetConfirmMoves(false));
     assert!(matches!(app.model().motion, Motion::Moving { .. }));
 }
 
@@ -389,14 +390,14 @@ fn a_pose_that_was_chosen_by_a_chain_that_does_not_fit_any_more_is_not_driven_to
     let mut bench = bench(&FakeCell::new(0));
     let app = &mut bench.app;
     app.replace_model(sample::solved());
-    app.apply(motion::Command::SetConfirmMoves(true));
+    app.apply(taught::Command::SetConfirmMoves(true));
     app.apply(guided::Command::CalibrateForMe);
     choose(app);
     let cell = app.model().cell.clone().expect("connected");
     let doubt = ArmDoubt::Foreign { distance_m: 0.05, angle_rad: 0.0 };
     app.absorb(connect::Event::Cell(Box::new(CellFacts { arm: None, arm_doubt: Some(doubt), ..cell })));
     assert!(!app.model().sequence_runs);
-    app.apply(motion::Command::ConfirmMove);
+    app.apply(taught::Command::ConfirmMove);
     assert_eq!(app.model().motion, Motion::Idle);
 }
 
@@ -513,7 +514,7 @@ fn an_answer_of_the_session_before_does_not_get_into_another_one() {
     state.folder = Some(PathBuf::from("first"));
     bench.app.absorb(session::Event::Document(Box::new(state.clone())));
     let job = bench.app.cx.numbers.job;
-    // Its captures have yet to be looked at, so that nothing new is solved before the old answer comes.
+    // Its captures have yet to be searched, so that nothing new is solved before the old answer comes.
     state.folder = Some(PathBuf::from("second"));
     state.document = sample::captured().session.document;
     bench.app.absorb(session::Event::Document(Box::new(state)));
@@ -551,7 +552,7 @@ fn poses_to_verify_at_are_visited_once_they_are_planned_and_a_stop_meanwhile_lea
 
     bench.app.apply(taught::Command::VerifyAtPlanned);
     let id = bench.app.cx.numbers.motion;
-    // A motion that is asked for meanwhile is refused, and the poses still come.
+    // A motion that is requested meanwhile is refused, and the poses still come.
     bench.app.apply(motion::Command::GoToCapture(CaptureId(1)));
     let other = bench.app.cx.numbers.motion;
     bench.app.absorb(motion::Event::Moved { id: other, outcome: MotionOutcome::Refused(Text::verbatim("busy")) });

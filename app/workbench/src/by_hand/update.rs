@@ -10,13 +10,19 @@ use handeye_session::Role;
 use super::command::{Command, Event};
 use super::state::{ByHand, HandChoice, HandWaits};
 use super::worker::HandJob;
-use crate::app::{Context, Numbers};
+use crate::app::context::{Context, Numbers};
+use crate::capture::state::CapturePurpose;
 use crate::capture::update::capture;
 use crate::guided::state::{ended, options};
-use crate::model::{CapturePurpose, Model, Motion, Pane, Severity, SolveStatus};
+use crate::messages::state::Severity;
+use crate::model::Model;
+use crate::motion::state::Motion;
+use crate::session::desk::SessionThreads;
+use crate::shell::state::Pane;
+use crate::solve::state::SolveStatus;
 use crate::solve::update::{chosen_box, corners, is_asked, seen, set_method};
 use crate::text::Text;
-use crate::worker::{SessionThreads, Workers};
+use crate::worker::threads::Workers;
 use handeye_wording::text;
 
 /// How long a robot has to rest in a good view before the capture begins \[s\]: a hand that moves past does not.
@@ -79,7 +85,7 @@ fn skip_view(model: &mut Model, desk: &mut SessionThreads, numbers: &mut Numbers
     guided_by_hand_step(model, desk, numbers);
 }
 
-/// Asks for the next view as soon as the answer from all captures is there; looked at after every event.
+/// Requests the next view as soon as the answer from all captures is there; checked after every event.
 pub(crate) fn guided_by_hand_step(model: &mut Model, desk: &mut SessionThreads, numbers: &mut Numbers) {
     let waits = model.by_hand.as_ref().map(|hand| hand.waits);
     if waits == Some(HandWaits::Capture) && model.capture.is_none() {
@@ -170,7 +176,7 @@ pub(crate) fn look_by_hand(model: &mut Model, workers: &Workers, numbers: &mut N
     capture(model, workers, numbers, purpose, None);
 }
 
-/// A capture is on the disk, whoever asked for it.
+/// A capture is on the disk, whether the guide or the user requested it.
 pub(crate) fn captured_by_hand(model: &mut Model, role: Option<Role>) {
     let Some(hand) = model.by_hand.as_deref_mut().filter(|hand| hand.waits != HandWaits::Choice) else {
         return;

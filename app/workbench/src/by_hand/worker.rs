@@ -12,7 +12,7 @@ use handeye_plan::guided::by_hand::{HandGuide, HandNext};
 
 use super::state::HandChoice;
 use crate::by_hand;
-use crate::model::Solved;
+use crate::solve::state::Solved;
 use crate::worker::link::Outlet;
 
 /// A requested choice.

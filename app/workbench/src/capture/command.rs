@@ -3,7 +3,7 @@
 use handeye_session::CaptureId;
 use serde::{Deserialize, Serialize};
 
-use crate::model::{CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait};
+use crate::capture::state::{CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait};
 
 /// What the user wants of captures.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -12,7 +12,7 @@ use handeye_geometry::targets::observation::Corners;
 use handeye_session::{Capture, CaptureId, Role, SessionError, Store};
 use image::{RgbImage, imageops};
 
-use crate::model::CapturePurpose;
+use crate::capture::state::CapturePurpose;
 
 /// Width of a thumbnail \[px\].
 const THUMBNAIL_WIDTH: u32 = 160;

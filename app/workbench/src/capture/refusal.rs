@@ -6,7 +6,7 @@ use handeye_detect::EdgeBlur;
 use handeye_detect::VisionError;
 use handeye_geometry::targets::TargetSpec;
 
-use crate::model::RefusalKind;
+use crate::capture::state::RefusalKind;
 use crate::text::Text;
 use handeye_wording::text;
 

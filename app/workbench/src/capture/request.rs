@@ -1,9 +1,9 @@
-//! What is asked for.
+//! The request.
 
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_session::Document;
 
-use crate::model::{CaptureOptions, CapturePurpose};
+use crate::capture::state::{CaptureOptions, CapturePurpose};
 
 /// A requested capture.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,8 +20,8 @@ pub struct CaptureRequest {
 }
 
 impl CaptureRequest {
-    /// For a session. At a pose that has a name a capture may be as similar to others as it likes: whoever taught two
-    /// poses close to each other wants both, and the reference poses have one twice.
+    /// For a session. At a pose that has a name a capture may be arbitrarily similar to others: if two poses were
+    /// taught close to each other both are wanted, and the reference poses contain one twice.
     pub fn new(
         number: u64,
         purpose: CapturePurpose,

@@ -14,7 +14,8 @@ use image::GrayImage;
 
 use super::refusal::{self, Why};
 use super::{CaptureRequest, Measured, thumbnail};
-use crate::model::{CaptureOptions, CaptureWait, FrameInfo, LiveFrame};
+use crate::capture::state::{CaptureOptions, CaptureWait};
+use crate::live::state::{FrameInfo, LiveFrame};
 
 /// The capture that is under way: takes in images one by one, from the request on, and reports what it waits for. Never
 /// waits itself.

@@ -6,7 +6,8 @@ use handeye_geometry::targets::TargetSpec;
 use handeye_images::gray_from_rgb;
 
 use super::{CaptureRequest, Measured, Sequence};
-use crate::model::{CaptureRefused, LiveFrame};
+use crate::capture::state::CaptureRefused;
+use crate::live::state::LiveFrame;
 
 /// Where the images of a capture come from.
 pub trait Images {
@@ -36,7 +37,7 @@ pub enum CaptureEnd {
 /// Takes a capture. Ends, whatever the images are: see [`handeye_capture::Machine`].
 ///
 /// # Errors
-/// Those of the images.
+/// The errors of the images.
 pub fn take<P: Images>(
     request: CaptureRequest,
     target: &TargetSpec,

@@ -1,16 +1,18 @@
 //! Captures.
 
 use handeye_capture::Wait;
-use handeye_session::CaptureId;
+use handeye_session::{CaptureId, Role};
 
 use super::command::{Command, Event};
-use crate::app::{Context, Numbers};
-use crate::by_hand::update::captured_by_hand;
+use crate::app::context::Numbers;
 use crate::capture::CaptureRequest;
-use crate::connect::update::forget_typed_pose;
-use crate::model::{CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, Model, Pane, Severity};
-use crate::taught::sequence::{break_off, sequence_captured, sequence_refused};
-use crate::worker::{VisionTask, Workers};
+use crate::capture::state::{CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait};
+use crate::messages::state::Severity;
+use crate::model::Model;
+use crate::shell::state::Pane;
+use crate::taught::break_off::break_off;
+use crate::worker::threads::Workers;
+use crate::worker::vision::VisionTask;
 use handeye_wording::text;
 
 /// Does what the user wants with captures.
@@ -22,16 +24,21 @@ pub(crate) fn apply(model: &mut Model, workers: &Workers, numbers: &mut Numbers,
     }
 }
 
-/// Takes in the progress of a capture.
-pub(crate) fn absorb(cx: &mut Context, event: Event) {
+/// How a capture has ended.
+pub(crate) enum Ended {
+    Refused(CaptureRefused),
+    /// It is on the disk, for this use.
+    Kept(Option<Role>),
+}
+
+/// Takes in how a capture goes on; returns how it has ended.
+pub(crate) fn absorb(model: &mut Model, event: Event) -> Option<Ended> {
     match event {
-        Event::Waits { number, wait } => capture_waits(&mut cx.model, number, wait),
-        Event::Refused { number, refused } => capture_refused(cx, number, refused),
-        Event::Captured { number, id } => {
-            captured(cx, number, id);
-            forget_typed_pose(&mut cx.model, &cx.workers);
-        }
+        Event::Waits { number, wait } => capture_waits(model, number, wait),
+        Event::Refused { number, refused } => return capture_refused(model, number, refused),
+        Event::Captured { number, id } => return Some(captured(model, number, id)),
     }
+    None
 }
 
 /// Takes a capture as soon as robot and image have settled.
@@ -89,22 +96,21 @@ fn capture_waits(model: &mut Model, number: u64, wait: CaptureWait) {
     }
 }
 
-fn capture_refused(cx: &mut Context, number: u64, refused: CaptureRefused) {
-    if cx.model.capture.as_ref().is_none_or(|capture| capture.number != number) {
-        return;
+fn capture_refused(model: &mut Model, number: u64, refused: CaptureRefused) -> Option<Ended> {
+    if model.capture.as_ref().is_none_or(|capture| capture.number != number) {
+        return None;
     }
-    cx.model.capture = None;
+    model.capture = None;
     let reported = text!("No capture: {why}", why = refused.why.clone());
-    cx.model.notify_in(Pane::Colour, Severity::Warning, reported);
-    sequence_refused(cx, &refused);
-    cx.model.refused = Some(refused);
+    model.notify_in(Pane::Colour, Severity::Warning, reported);
+    Some(Ended::Refused(refused))
 }
 
-fn captured(cx: &mut Context, number: u64, id: CaptureId) {
-    if cx.model.capture.as_ref().is_some_and(|capture| capture.number == number) {
-        cx.model.capture = None;
+fn captured(model: &mut Model, number: u64, id: CaptureId) -> Ended {
+    if model.capture.as_ref().is_some_and(|capture| capture.number == number) {
+        model.capture = None;
     }
-    let capture = cx.model.document().capture(id);
+    let capture = model.document().capture(id);
     let settled = capture.and_then(|it| it.settled_s).map(|settled_s| format!("{settled_s:.2}"));
     let noise = capture.and_then(|it| it.corner_noise_px).map(|noise_px| format!("{noise_px:.3}"));
     let text = match (settled, noise) {
@@ -117,8 +123,6 @@ fn captured(cx: &mut Context, number: u64, id: CaptureId) {
         (Some(settled), None) => text!("Capture {id} is kept (settled in {settled} s)", id = id, settled = settled),
         (None, _) => text!("Capture {id} is kept", id = id),
     };
-    cx.model.notify(Severity::Info, text);
-    let role = cx.model.document().capture(id).map(|it| it.role);
-    sequence_captured(cx);
-    captured_by_hand(&mut cx.model, role);
+    model.notify(Severity::Info, text);
+    Ended::Kept(model.document().capture(id).map(|it| it.role))
 }

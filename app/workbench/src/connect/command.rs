@@ -6,7 +6,9 @@ use handeye_geometry::frames::Pose;
 use handeye_geometry::frames::Tip;
 use serde::{Deserialize, Serialize};
 
-use crate::model::{CellFacts, CellSource, Link, LinkState, RobotState, Severity};
+use crate::connect::state::{Link, LinkState};
+use crate::messages::state::Severity;
+use handeye_link::{CellFacts, CellSource, RobotState};
 
 /// What the user wants of the connection to the cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

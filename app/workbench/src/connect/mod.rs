@@ -2,14 +2,14 @@
 
 pub mod command;
 pub mod offered;
-pub mod stop_line;
+pub(crate) mod state;
 pub(crate) mod update;
 pub(crate) mod worker;
 
 pub use command::{Command, Event};
 
-use crate::model::CellSource;
 use crate::text::Text;
+use handeye_link::CellSource;
 use handeye_wording::text;
 
 /// What is connected, in the user's language where it is part of this program.

@@ -7,23 +7,30 @@ use handeye_coppeliasim::cell::CellPaths;
 use handeye_geometry::frames::{Base, Pose, Tip};
 
 use super::command::{Command, Event};
-use crate::app::{Connector, Context};
+use crate::app::context::{Connector, Context};
 use crate::connect::server_name;
+use crate::connect::state::{Link, LinkState};
+use crate::connect::worker::ControlTask;
 use crate::keep_out::update::send_keep_out;
-use crate::model::{
-    ArmDoubt, BoardMotion, CellFacts, CellSource, Home, Link, LinkState, Model, Motion, RobotState, Severity, Trail,
-};
+use crate::live::worker::CameraTask;
+use crate::messages::state::{Home, Severity};
+use crate::model::Model;
 use crate::motion::rest::stop_seen;
+use crate::motion::state::Motion;
 use crate::motion::update::motion_lost;
-use crate::session::update::{prepare_session, send_intrinsics, send_target};
+use crate::session::desk::SessionThreads;
+use crate::session::requests::{send_intrinsics, send_target};
+use crate::session::update::prepare_session;
+use crate::settings::ADDRESSES;
 use crate::taught::sequence::stop_sequence;
 use crate::text::Text;
+use crate::track::state::BoardMotion;
+use crate::track::trail::Trail;
 use crate::track::update::{reconsider_correction, send_tracking};
-use crate::worker::{CameraTask, ControlTask, Request, SessionThreads, Workers};
+use crate::worker::link::Request;
+use crate::worker::threads::Workers;
+use handeye_link::{ArmDoubt, CellFacts, CellSource, RobotState};
 use handeye_wording::text;
-
-/// Number of earlier addresses that are offered again.
-pub const ADDRESSES: usize = 8;
 
 /// Does what is wanted of the connection.
 pub(crate) fn apply(cx: &mut Context, connector: &Connector, command: Command) {

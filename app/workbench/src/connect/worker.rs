@@ -7,19 +7,22 @@ use handeye_coppeliasim::CancelToken;
 use handeye_driver::LogLevel;
 use handeye_geometry::frames::{Base, Pose, Tip};
 
-use super::stop_line::StopLine;
-use crate::model::{BoardMotion, CellSource, Link, RobotState, Severity, Simulation};
-use crate::worker::MAX_EVENTS;
+use crate::connect::state::Link;
+use crate::messages::state::Severity;
+use crate::motion::stop_line::StopLine;
+use crate::track::state::BoardMotion;
 use crate::worker::channels::LatestSlot;
 use crate::worker::link::{Duty, Outlet};
+use crate::worker::shared::MAX_EVENTS;
 use crate::{connect, motion};
 use handeye_link::{Cell, Connected, ControlPort, PortError};
+use handeye_link::{CellSource, RobotState, Simulation};
 use handeye_wording::text;
 
 /// Pause between two readings: numbers that change faster cannot be read, and each reading redraws the window.
 const PERIOD: Duration = Duration::from_millis(100);
 
-/// What the control worker can be asked for.
+/// Requests to the control worker.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ControlTask {
     /// Look at the [`StopLine`] now.

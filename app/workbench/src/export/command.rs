@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use handeye_export::ExportNames;
 use serde::{Deserialize, Serialize};
 
-use crate::model::{Preview, Written};
+use crate::export::state::{Preview, Written};
 
 /// What the user wants of exports.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -4,9 +4,14 @@ use handeye_export::ExportNames;
 use handeye_session::{CaptureRecord, Edit};
 
 use super::command::{Command, Event};
-use crate::model::{Model, Pane, Severity, Written, exports_of};
-use crate::session::update::edit;
-use crate::worker::{ExportJob, FileTask, SessionThreads};
+use crate::export::state::Written;
+use crate::live::state::exports_of;
+use crate::messages::state::Severity;
+use crate::model::Model;
+use crate::session::desk::SessionThreads;
+use crate::session::requests::edit;
+use crate::shell::state::Pane;
+use crate::worker::files::{ExportJob, FileTask};
 use handeye_wording::text;
 
 /// Does what is wanted of exports.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::guided::state::ChoiceOutcome;
-use crate::model::MotionId;
+use crate::motion::state::MotionId;
 
 /// What the user wants of guided capture.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -5,6 +5,7 @@
 //! session.
 
 pub mod command;
+pub(crate) mod progress;
 pub mod state;
 pub(crate) mod update;
 

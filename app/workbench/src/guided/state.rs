@@ -8,7 +8,8 @@ use handeye_geometry::progress::CancelToken;
 use handeye_plan::guided::choose::{Proposal, Robot};
 use handeye_plan::guided::{CHECKS, Ending, Guide, GuidedOptions, Known, Next, Why};
 
-use crate::model::{Severity, Solved};
+use crate::messages::state::Severity;
+use crate::solve::state::Solved;
 use crate::text::Text;
 use handeye_wording::text;
 
@@ -72,7 +73,7 @@ impl GuidedProgress {
     }
 }
 
-/// A choice that is asked for.
+/// A requested choice.
 #[derive(Debug, Clone)]
 pub struct GuideRequest {
     /// What chooses.
@@ -85,7 +86,7 @@ pub struct GuideRequest {
     pub elapsed_s: f64,
     /// How fast the arm is driven, of its highest speed.
     pub speed: f64,
-    /// The number of the check, where a pose to check the answer at is asked for.
+    /// The number of the check, if a verification pose is requested.
     pub check: Option<usize>,
 }
 

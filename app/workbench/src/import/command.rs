@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::{Converted, Found, ImportWork};
+use crate::import::state::{Converted, Found, ImportWork};
 use crate::text::Text;
 
 /// What the user wants of recordings in other tools' formats.
@@ -21,7 +21,7 @@ pub enum Command {
     FixConvention {
         /// Its key, as `handeye import --set` has it.
         key: String,
-        /// Its value; `None`: as the data tell.
+        /// Its value; `None`: as the data determine.
         value: Option<String>,
     },
     /// Take this hypothesis about the recording, by its place in the list.
@@ -37,14 +37,14 @@ pub enum Command {
 pub enum Event {
     /// There is neither a session nor a data set: it may be a recording of another tool.
     NoSession(PathBuf),
-    /// How far a recording is looked at, or converted.
+    /// Progress of examining or converting a recording.
     Progress {
         /// The number of the request.
         number: u64,
         /// How far.
         work: ImportWork,
     },
-    /// A recording was looked at.
+    /// A recording was examined.
     #[serde(skip)]
     Looked {
         /// The number of the request.

@@ -12,12 +12,15 @@ use super::command::{Command, Event};
 use super::state::{Converted, Found, ImportState, ImportWork};
 use super::understand;
 use super::worker::{ImportJob, ImportTask};
-use crate::app::{Numbers, Reach, bounds_of};
+use crate::app::context::Numbers;
+use crate::app::reach::{Reach, bounds_of};
 use crate::arguments::of_text;
-use crate::model::{Dialog, Model, Severity};
+use crate::messages::state::Severity;
+use crate::model::Model;
 use crate::session::archive::ArchiveTask;
+use crate::session::desk::SessionThreads;
+use crate::shell::state::Dialog;
 use crate::text::Text;
-use crate::worker::SessionThreads;
 use handeye_wording::Value;
 use handeye_wording::text;
 

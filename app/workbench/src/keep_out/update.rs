@@ -9,10 +9,12 @@ use handeye_plan::surroundings::{KeepOutFile, SurroundingsError};
 
 use super::command::{Command, Event};
 use super::state::KeepOut;
+use crate::messages::state::Severity;
 use crate::model::Model;
-use crate::model::Severity;
+use crate::session::desk::SessionThreads;
 use crate::text::Text;
-use crate::worker::{FileTask, SessionThreads, Workers};
+use crate::worker::files::FileTask;
+use crate::worker::threads::Workers;
 use handeye_wording::text;
 
 /// How long after the last change they are written \[s\]: a value that is dragged changes with every frame.

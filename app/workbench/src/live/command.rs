@@ -5,7 +5,9 @@ use std::sync::Arc;
 use handeye_geometry::depth::ColourMap;
 use serde::{Deserialize, Serialize};
 
-use crate::model::{DepthScale, FrameImages, FrameInfo, ImagePoint, LiveDetection, Overlays, Viewport};
+use crate::capture::state::LiveDetection;
+use crate::live::state::{FrameImages, FrameInfo, ImagePoint, Overlays, Viewport};
+use crate::shell::view::DepthScale;
 
 /// What the user wants of the live images.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

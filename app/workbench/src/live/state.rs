@@ -1,4 +1,4 @@
-//! The newest images, and how they are looked at.
+//! The newest images, and how they are viewed.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -11,7 +11,6 @@ use handeye_geometry::frames::{Base, Pose, Target, Tip};
 use image::RgbImage;
 use serde::{Deserialize, Serialize};
 
-use crate::scene::{AZIMUTH_RAD, ELEVATION_RAD};
 use crate::text::Text;
 
 /// What is known about a frame in addition to its pixels.
@@ -86,7 +85,7 @@ impl ColouredDepth {
     }
 }
 
-/// Sizes only: a million pixels say nothing in a log.
+/// Sizes only: a million pixels are useless in a log.
 impl fmt::Debug for FrameImages {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { rgb, depth } = self;
@@ -168,26 +167,6 @@ pub struct Viewport {
 impl Default for Viewport {
     fn default() -> Self {
         Self { centre: [0.5, 0.5], zoom: 1.0 }
-    }
-}
-
-/// The viewpoint of the 3D pane: an eye that orbits a point, with z of the base upwards.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct SceneView {
-    /// The point in the middle of the pane, in the base \[m\].
-    pub centre_m: [f64; 3],
-    /// Direction from there to the eye, about z of the base and counted from its x \[rad\].
-    pub azimuth_rad: f64,
-    /// The same over the ground: from −π/2, straight from below, to π/2, straight from above \[rad\].
-    pub elevation_rad: f64,
-    /// Distance of the eye from there \[m\].
-    pub distance_m: f64,
-}
-
-impl Default for SceneView {
-    /// Obliquely from above, with an arm of this size and its reach in view.
-    fn default() -> Self {
-        Self { centre_m: [0.0, -0.1, 0.45], azimuth_rad: AZIMUTH_RAD, elevation_rad: ELEVATION_RAD, distance_m: 1.9 }
     }
 }
 

@@ -6,13 +6,16 @@ use handeye_geometry::frames::{Base, Pose, Tip};
 use nalgebra::Vector2;
 
 use super::command::{Command, Event};
-use crate::app::Numbers;
+use crate::app::context::Numbers;
 use crate::by_hand::update::look_by_hand;
 use crate::connect::update::ask_camera;
-use crate::model::{DepthScale, ImagePoint, LiveFrame, MeasuredTwice, Model, PickedPoint};
+use crate::live::state::{ImagePoint, LiveFrame, MeasuredTwice, PickedPoint};
+use crate::live::worker::CameraTask;
+use crate::model::Model;
 use crate::motion::correction::corrected;
+use crate::shell::view::DepthScale;
 use crate::text::Text;
-use crate::worker::{CameraTask, Workers};
+use crate::worker::threads::Workers;
 use handeye_wording::text;
 
 /// Does what is wanted of the live images.

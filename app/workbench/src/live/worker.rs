@@ -7,8 +7,10 @@ use handeye_coppeliasim::CancelToken;
 use handeye_geometry::depth::ColourMap;
 use handeye_geometry::frames::{Base, Pose, Tip};
 
+use crate::connect::state::Link;
 use crate::live::depth;
-use crate::model::{ColouredDepth, DepthScale, FrameImages, FrameInfo, Link, LiveFrame, ViewSettings};
+use crate::live::state::{ColouredDepth, FrameImages, FrameInfo, LiveFrame};
+use crate::shell::view::{DepthScale, ViewSettings};
 use crate::worker::channels::{LatestSlot, Tap};
 use crate::worker::link::{Duty, Outlet};
 use crate::worker::rate::RateMeter;
@@ -18,7 +20,7 @@ use handeye_wording::text;
 /// Pause between two looks at the clock of the cell: a third of the pass of a simulation at its usual 50 ms.
 const PERIOD: Duration = Duration::from_millis(15);
 
-/// What the camera worker can be asked for.
+/// Requests to the camera worker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CameraTask {
     /// Which depths the colour map covers, from the next image on.

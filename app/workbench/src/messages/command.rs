@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::Severity;
+use crate::messages::state::Severity;
 use crate::text::Text;
 
 /// What the user wants of messages.

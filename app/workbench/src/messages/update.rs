@@ -1,7 +1,9 @@
 //! Notifications for the user.
 
 use super::command::{Command, Event};
-use crate::model::{Home, Model, Pane, Severity};
+use crate::messages::state::{Home, Severity};
+use crate::model::Model;
+use crate::shell::state::Pane;
 use crate::text::Text;
 use handeye_wording::text;
 

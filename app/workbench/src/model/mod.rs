@@ -13,30 +13,30 @@ use handeye_estimate::Method;
 use handeye_estimate::handeye::HandEye;
 use handeye_estimate::verify::Predictor;
 use handeye_geometry::camera::Intrinsics;
-use handeye_geometry::depth::ColourMap;
 use handeye_geometry::frames::{Camera, Pose, Tip};
-use handeye_plan::guided::GuidedOptions;
 use handeye_plan::guided::choose::Proposal;
 use handeye_session::{CaptureId, Document};
-use serde::{Deserialize, Serialize};
 
 pub use crate::by_hand::state::ByHand;
 pub use crate::capture::state::{
     CaptureOptions, CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, LiveDetection, RefusalKind,
 };
+pub use crate::connect::state::{Link, LinkState};
 pub use crate::export::state::{ExportState, Preview, PreviewFile, Written};
 pub use crate::import::state::{Converted, Found, ImportState, ImportWork};
 pub use crate::live::state::{
-    ColouredDepth, FrameImages, FrameInfo, ImagePoint, LiveFrame, MeasuredTwice, Overlays, PickedPoint, SceneView,
-    Viewport, exports_of,
+    ColouredDepth, FrameImages, FrameInfo, ImagePoint, LiveFrame, MeasuredTwice, Overlays, PickedPoint, Viewport,
+    exports_of,
 };
 pub use crate::messages::state::{Home, Message, Messages, Severity};
 pub use crate::motion::state::{JogSettings, JogStep, Motion, MotionId, MotionRequest, PendingMove};
 pub use crate::recording::state::{RerunState, ViewerState};
+pub use crate::scene::view::SceneView;
 pub use crate::session::state::{
     FolderEntry, FolderKind, FolderListing, Observed, PoseSequence, RecentSession, Review, SessionState, StopOutcome,
 };
 pub use crate::shell::state::{Dialog, Pane, Step};
+pub use crate::shell::view::{DepthScale, Goal, RotationFormat, ThemeChoice, ViewSettings};
 pub use crate::solve::estimated::{EstimatedValue, estimated};
 pub use crate::solve::state::{Corrected, JobId, SolveState, SolveStatus, Solved};
 pub use crate::solve::tip_box::{BoxState, WorkBox, in_camera as box_in_camera, judge_box};
@@ -51,156 +51,11 @@ pub use handeye_link::{
 };
 
 use crate::keep_out::state::KeepOut;
-use crate::motion::rest::Stopping;
-use crate::motion::way::Way;
+use crate::motion::state::Stopping;
 use crate::session::start;
-use crate::text::{Language, Text};
 
 /// Age \[s\] from which it is reported: of an image or a reading of the robot that should come many times a second.
 pub const STALE_AFTER_S: f64 = 1.0;
-
-/// The connections to the cell.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Link {
-    /// Joints, tip, simulation, stop.
-    Control,
-    /// Images.
-    Camera,
-    Motion,
-}
-
-/// How a connection is doing.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum LinkState {
-    /// The built-in cell is being started.
-    StartingCell {
-        /// Why the last try failed.
-        why: Option<Text>,
-    },
-    /// It has never been connected yet.
-    Searching {
-        /// Where a server is expected.
-        address: String,
-        /// How many times it was tried, this one included.
-        attempt: u32,
-        /// Why the last try failed.
-        why: Option<Text>,
-    },
-    /// It works.
-    Connected {
-        /// Where the server is.
-        address: String,
-        /// What it is, for example `CoppeliaSim 4.10.0`.
-        server: String,
-    },
-    /// It worked and broke; the next try comes after a pause.
-    Lost {
-        /// When it broke.
-        since_s: f64,
-        why: Text,
-        /// How many times it was tried since.
-        attempt: u32,
-        /// When it is tried next.
-        next_s: f64,
-    },
-    /// It worked and broke, and is being tried right now.
-    Retrying {
-        /// When it broke.
-        since_s: f64,
-        /// Why it broke, or why the last try failed.
-        why: Text,
-        /// How many times it was tried since, this one included.
-        attempt: u32,
-    },
-    /// The user does not want it to be tried.
-    Resting {
-        /// Why there is no connection.
-        why: Text,
-    },
-    /// Trying again cannot help until the user does something.
-    Failed {
-        /// What is wrong and what to do.
-        why: Text,
-    },
-}
-
-impl LinkState {
-    /// Whether calls get through.
-    pub fn is_connected(&self) -> bool {
-        matches!(self, Self::Connected { .. })
-    }
-}
-
-/// Which depths the colour map covers.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum DepthScale {
-    /// Those that are in the image.
-    #[default]
-    Auto,
-    /// Those that the sensor can measure.
-    Full,
-}
-
-/// Light or dark.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ThemeChoice {
-    /// Dark surfaces.
-    #[default]
-    Dark,
-    /// Light surfaces.
-    Light,
-}
-
-impl ThemeChoice {}
-
-/// How the rotation of the tip is written.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum RotationFormat {
-    /// Roll, pitch, yaw in degrees, URDF's order.
-    #[default]
-    #[serde(rename = "rpy")]
-    RollPitchYaw,
-    /// Quaternion x, y, z, w.
-    Quaternion,
-}
-
-/// What the window remembers from one start to the next.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct ViewSettings {
-    pub depth_colours: ColourMap,
-    /// What is drawn over the images.
-    pub overlays: Overlays,
-    /// How the tip is jogged.
-    pub jog: JogSettings,
-    /// How captures are taken.
-    pub capture: CaptureOptions,
-    /// The error that is good enough.
-    pub goal: Goal,
-    /// Whether each move to a chosen pose waits to be confirmed; `None` asks the cell, see [`Model::confirms_moves`].
-    pub confirm_moves: Option<bool>,
-    /// Light or dark.
-    pub theme: ThemeChoice,
-    /// Language of all texts.
-    pub language: Language,
-    /// How rotations are written.
-    pub rotation: RotationFormat,
-    /// Which depths the colour map covers.
-    pub depth_scale: DepthScale,
-}
-
-/// An error \[m\] that is good enough, 95 %.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Goal(pub f64);
-
-impl Default for Goal {
-    /// The same as for guided capture, in the window and on the command line.
-    fn default() -> Self {
-        Self(GuidedOptions::default().goal_m)
-    }
-}
 
 /// Everything that the window shows.
 #[expect(clippy::struct_excessive_bools, reason = "each is a state of its own")]
@@ -478,24 +333,6 @@ impl Model {
         self.view.confirm_moves.unwrap_or(self.may_be_real())
     }
 
-    /// Whether a move to the next pose of a sequence, or to a place that was chosen by its name, waits until the user has seen how
-    /// far it is. Where the arm may be real the first one always does.
-    pub(crate) fn asks_before(&self, goal: &MotionGoal) -> bool {
-        // An arm that is read-only refuses with the reason, and one that is already there does not move.
-        if !self.is_armed() || Way::to(goal, self).is_some_and(|way| way.is_none()) {
-            return false;
-        }
-        let sequence = self.sequence.as_ref().filter(|_| self.sequence_runs);
-        let is_first = sequence.is_none() || !self.let_go;
-        let each = match sequence {
-            Some(sequence) if sequence.planned.is_some() => self.confirms_moves(),
-            // The user has been at taught poses.
-            Some(_) => self.view.confirm_moves == Some(true),
-            None => false,
-        };
-        each || is_first && self.may_be_real()
-    }
-
     /// Share of its fastest speed at which the arm moves: as the user wants it, or else a quarter, and half in the built-in
     /// cell, because an arm behind an address may be real.
     pub fn speed(&self) -> f64 {
@@ -536,16 +373,5 @@ impl Model {
     pub fn resting_simulation(&self) -> Option<Simulation> {
         let robot = self.robot.as_ref().filter(|_| self.control.is_connected())?;
         (robot.simulation != Simulation::Running).then_some(robot.simulation)
-    }
-}
-
-impl LinkState {
-    /// The state before the first try.
-    pub(crate) fn first(source: &CellSource) -> Self {
-        match source {
-            CellSource::BuiltIn(_) => Self::StartingCell { why: None },
-            CellSource::Address(address) => Self::Searching { address: address.clone(), attempt: 1, why: None },
-            CellSource::Drivers(drivers) => Self::Searching { address: drivers.to_string(), attempt: 1, why: None },
-        }
     }
 }

@@ -1,17 +1,20 @@
 //! Moves that wait until the user has seen how far they are and allows them: of every sequence, to a place that was chosen by its
 //! name, and home.
 
-use crate::app::Context;
-use crate::guided::update::{guided_chooses_anew, guided_skips};
-use crate::model::{Model, MotionGoal, Pane, PendingMove, Severity, StopOutcome};
+use crate::app::context::Context;
+use crate::messages::state::Severity;
+use crate::model::Model;
+use crate::motion::state::PendingMove;
 use crate::motion::update::start_motion;
-use crate::taught::sequence::end_stop;
+use crate::motion::way::Way;
+use crate::shell::state::Pane;
 use crate::text::Text;
+use handeye_link::MotionGoal;
 use handeye_wording::text;
 
 /// Moves the arm there, once the user allows it where confirmation is needed.
 pub(crate) fn set_out(cx: &mut Context, goal: MotionGoal, what: Text) {
-    if cx.model.asks_before(&goal) {
+    if asks_before(&cx.model, &goal) {
         cx.model.messages.is_over_in(Pane::Jog);
         cx.model.asked = Some(PendingMove { goal, what });
     } else {
@@ -31,34 +34,6 @@ pub(crate) fn may_set_out(model: &mut Model) -> bool {
     !model.sequence_runs
 }
 
-/// The user allows the move.
-pub(crate) fn confirm_move(cx: &mut Context) {
-    let Some(PendingMove { goal, what }) = cx.model.asked.take() else { return };
-    if guided_chooses_anew(&mut cx.model) {
-        return;
-    }
-    cx.model.let_go = true;
-    start_motion(cx, goal, what);
-}
-
-/// The user skips the move: a sequence continues with another pose.
-pub(crate) fn skip_move(cx: &mut Context) {
-    if cx.model.asked.take().is_none() || guided_skips(cx) {
-        return;
-    }
-    if cx.model.sequence_runs {
-        end_stop(cx, StopOutcome::Skipped(text!("skipped by the user")));
-    }
-}
-
-/// Whether every move to a chosen pose waits. A waiting one begins if that is no longer wanted.
-pub(crate) fn set_confirm_moves(cx: &mut Context, confirm: bool) {
-    cx.model.view.confirm_moves = Some(confirm);
-    if cx.model.asked.as_ref().is_some_and(|asked| !cx.model.asks_before(&asked.goal)) {
-        confirm_move(cx);
-    }
-}
-
 /// To where the arm was when the cell was connected.
 pub(crate) fn go_home(cx: &mut Context) {
     let Some(home) = cx.model.home else {
@@ -67,4 +42,22 @@ pub(crate) fn go_home(cx: &mut Context) {
     if may_set_out(&mut cx.model) {
         set_out(cx, MotionGoal::Joints(home), text!("home"));
     }
+}
+
+/// Whether a move to the next pose of a sequence, or to a place that was chosen by its name, waits until the user has seen how
+/// far it is. Where the arm may be real the first one always does.
+pub(crate) fn asks_before(model: &Model, goal: &MotionGoal) -> bool {
+    // An arm that is read-only refuses with the reason, and one that is already there does not move.
+    if !model.is_armed() || Way::to(goal, model).is_some_and(|way| way.is_none()) {
+        return false;
+    }
+    let sequence = model.sequence.as_ref().filter(|_| model.sequence_runs);
+    let is_first = sequence.is_none() || !model.let_go;
+    let each = match sequence {
+        Some(sequence) if sequence.planned.is_some() => model.confirms_moves(),
+        // The user has been at taught poses.
+        Some(_) => model.view.confirm_moves == Some(true),
+        None => false,
+    };
+    each || is_first && model.may_be_real()
 }

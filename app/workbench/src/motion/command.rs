@@ -4,8 +4,9 @@ use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_session::CaptureId;
 use serde::{Deserialize, Serialize};
 
-use crate::model::{Jog, JogSettings, MotionGoal, MotionId, MotionOutcome};
+use crate::motion::state::{JogSettings, MotionId};
 use crate::text::Text;
+use handeye_link::{Jog, MotionGoal, MotionOutcome};
 
 /// What the user wants of moving the arm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -40,12 +41,6 @@ pub enum Command {
     GoHome,
     /// Move to where a capture was taken.
     GoToCapture(CaptureId),
-    /// Allow the move that is waiting.
-    ConfirmMove,
-    /// Skip the move that waits; a sequence continues with another pose.
-    SkipMove,
-    /// Whether each move to a chosen pose waits to be confirmed.
-    SetConfirmMoves(bool),
 }
 
 /// What has happened to moving the arm.

@@ -1,12 +1,11 @@
 //! Moves that allow for the errors of the arm.
 
-use std::sync::Arc;
-
 use handeye_estimate::corrected_arm::CorrectedArm;
 use handeye_geometry::frames::{Base, Pose, Tip};
 
-use crate::model::{Corrected, Model, MotionGoal, RobotState, Solved};
-use crate::text::Text;
+use crate::model::Model;
+use crate::solve::state::{Corrected, Solved};
+use handeye_link::RobotState;
 
 /// How far the chain of the answer may be from where the robot reports its tip, metres and radians: farther off it is another arm, or
 /// another tool.
@@ -49,29 +48,4 @@ pub fn real_tip(model: &Model) -> Option<Pose<Base, Tip>> {
 pub fn real_tip_error_95_m(model: &Model) -> Option<f64> {
     let (_, corrected) = corrected(model)?;
     corrected.arm.error_95_m(&model.robot.as_ref()?.joints_rad).ok()
-}
-
-/// The arm by which a move is corrected, and where it begins.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Correction {
-    /// The arm with its errors.
-    pub arm: Arc<CorrectedArm>,
-    /// Joint values near which the arm should stay, radians.
-    pub near_rad: Vec<f64>,
-}
-
-impl Correction {
-    /// What to command so that the tip really gets to `goal`; a goal in joint values is left as it is.
-    ///
-    /// # Errors
-    /// Why there is no such command.
-    pub(crate) fn command(&self, goal: &MotionGoal) -> Result<MotionGoal, Text> {
-        match goal {
-            MotionGoal::Tip(wanted) => match self.arm.command(wanted, &self.near_rad) {
-                Ok(command) => Ok(MotionGoal::Tip(command.base_from_tip)),
-                Err(why) => Err(Text::from(why)),
-            },
-            MotionGoal::Joints(_) => Ok(*goal),
-        }
-    }
 }

@@ -10,12 +10,14 @@ use handeye_plan::Surroundings;
 use super::command::Event;
 use super::grip::{Grip, SILENCE};
 use super::jog_line::{Held, JogLine};
-use crate::connect::stop_line::StopLine;
 use crate::guided::state::GuideRequest;
-use crate::model::{FollowRequest, MotionGoal, MotionId, MotionOutcome, MotionRequest};
+use crate::motion::state::{MotionId, MotionRequest};
+use crate::motion::stop_line::StopLine;
 use crate::text::Text;
-use crate::worker::Waker;
+use crate::track::state::FollowRequest;
+use crate::worker::shared::Waker;
 use handeye_link::{JogRequest, ViewsRequest};
+use handeye_link::{MotionGoal, MotionOutcome};
 use handeye_wording::text;
 
 /// A motion with an end.
@@ -47,7 +49,7 @@ pub enum MotionTask {
         /// What is wanted.
         request: Box<GuideRequest>,
     },
-    /// Nothing that moves: where the board can be looked at from, which only the arm's kinematics determines.
+    /// Nothing that moves: where the board can be seen from, which only the arm's kinematics determines.
     Plan {
         /// Its number.
         id: MotionId,
@@ -76,7 +78,7 @@ impl MotionTask {
     }
 }
 
-/// What the worker is to do next.
+/// What the worker has to do next.
 #[derive(Debug)]
 pub enum Work {
     Nothing,

@@ -1,6 +1,6 @@
 //! The path of a held jog button to the arm: a dead man's switch. No thread, no clock: the caller passes the time.
 
-use crate::model::Jog;
+use handeye_link::Jog;
 use handeye_link::JogRequest;
 
 /// A button counts as held for this long \[s\] after the window last reported it: a few frames of a busy window, and

@@ -8,6 +8,7 @@ pub mod grip;
 pub(crate) mod jog_line;
 pub(crate) mod rest;
 pub(crate) mod state;
+pub mod stop_line;
 pub(crate) mod update;
 pub mod way;
 pub(crate) mod worker;

@@ -3,21 +3,18 @@
 use handeye_driver::{Place, RestWatch};
 use handeye_link::moved_text;
 
+use super::state::Stopping;
 use crate::capture::update::cancel_capture;
-use crate::model::{Model, Motion, Moves, RobotState, Severity, Simulation};
+use crate::messages::state::Severity;
+use crate::model::Model;
+use crate::motion::state::Motion;
 use crate::text::Text;
-use crate::worker::Workers;
+use crate::worker::threads::Workers;
+use handeye_link::{Moves, RobotState, Simulation};
 use handeye_wording::text;
 
 /// Time \[s\] that an arm has to come to rest: the same as a driver has for its own answer.
 const PATIENCE_S: f64 = 2.0;
-
-/// An arm that was commanded to stop, until its states show that it is at rest.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stopping {
-    since_s: f64,
-    watch: RestWatch,
-}
 
 /// The arm was commanded to stop. Its states show whether it did.
 fn watch_stop(model: &mut Model) {

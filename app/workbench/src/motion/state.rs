@@ -1,9 +1,12 @@
 //! What the arm does and is asked to do.
 
+use std::sync::Arc;
+
+use handeye_driver::RestWatch;
+use handeye_estimate::corrected_arm::CorrectedArm;
 use handeye_link::{Jog, JogFrame, MotionGoal};
 use serde::{Deserialize, Serialize};
 
-use crate::motion::correction::Correction;
 use crate::text::Text;
 
 /// Counts motions, to distinguish reports from those of earlier motions.
@@ -48,7 +51,7 @@ pub enum Motion {
     /// Nothing.
     #[default]
     Idle,
-    /// It is on its way.
+    /// It is moving.
     Moving {
         id: MotionId,
         /// Where to, in words.
@@ -92,5 +95,37 @@ pub struct JogSettings {
 impl Default for JogSettings {
     fn default() -> Self {
         Self { frame: JogFrame::Base, step: JogStep::Hold, speed: None }
+    }
+}
+
+/// An arm that was commanded to stop, until its states show that it is at rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stopping {
+    pub(super) since_s: f64,
+    pub(super) watch: RestWatch,
+}
+
+/// The arm by which a move is corrected, and where it begins.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Correction {
+    /// The arm with its errors.
+    pub arm: Arc<CorrectedArm>,
+    /// Joint values near which the arm should stay, radians.
+    pub near_rad: Vec<f64>,
+}
+
+impl Correction {
+    /// What to command so that the tip really gets to `goal`; a goal in joint values is left as it is.
+    ///
+    /// # Errors
+    /// Why there is no such command.
+    pub(crate) fn command(&self, goal: &MotionGoal) -> Result<MotionGoal, Text> {
+        match goal {
+            MotionGoal::Tip(wanted) => match self.arm.command(wanted, &self.near_rad) {
+                Ok(command) => Ok(MotionGoal::Tip(command.base_from_tip)),
+                Err(why) => Err(Text::from(why)),
+            },
+            MotionGoal::Joints(_) => Ok(*goal),
+        }
     }
 }

@@ -7,15 +7,19 @@ use handeye_geometry::frames::{Camera, Pose, Tip};
 use handeye_session::CaptureId;
 
 use super::command::{Command, Event};
-use crate::app::{Context, Numbers};
-use crate::model::{Jog, JogStep, Model, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest, Pane, Severity};
-use crate::motion::ask::{confirm_move, go_home, may_set_out, set_confirm_moves, set_out, skip_move};
-use crate::motion::correction::{Correction, corrected};
+use crate::app::context::{Context, Numbers};
+use crate::messages::state::Severity;
+use crate::model::Model;
+use crate::motion::ask::{go_home, may_set_out, set_out};
+use crate::motion::correction::corrected;
 use crate::motion::rest::{stop, stopped};
-use crate::taught::sequence::{plan_refused, sequence_moved};
+use crate::motion::state::Correction;
+use crate::motion::state::{JogStep, Motion, MotionId, MotionRequest};
+use crate::shell::state::Pane;
 use crate::text::Text;
 use crate::track::update::follow_ended;
-use crate::worker::Workers;
+use crate::worker::threads::Workers;
+use handeye_link::{Jog, MotionGoal, MotionOutcome};
 use handeye_wording::text;
 
 /// Does what is wanted of the arm.
@@ -30,19 +34,25 @@ pub(crate) fn apply(cx: &mut Context, command: Command) {
         Command::SetJog(settings) => cx.model.view.jog = settings,
         Command::GoHome => go_home(cx),
         Command::GoToCapture(id) => go_to_capture(cx, id),
-        Command::ConfirmMove => confirm_move(cx),
-        Command::SkipMove => skip_move(cx),
-        Command::SetConfirmMoves(confirm) => set_confirm_moves(cx, confirm),
     }
 }
 
-/// Takes in what the arm did.
-pub(crate) fn absorb(cx: &mut Context, event: Event) {
+/// What a motion was for that has ended.
+pub(crate) enum Ended {
+    /// The plan of poses to verify at.
+    Plan(MotionOutcome),
+    /// The sequence that is under way.
+    Sequence(MotionOutcome),
+}
+
+/// Takes in what the arm did; returns what has ended for another feature.
+pub(crate) fn absorb(cx: &mut Context, event: Event) -> Option<Ended> {
     match event {
         Event::Stopped => stopped(&mut cx.model),
-        Event::Moved { id, outcome } => moved(cx, id, outcome),
+        Event::Moved { id, outcome } => return moved(cx, id, outcome),
         Event::JogEnded { why } => jog_ended(&mut cx.model, why),
     }
+    None
 }
 
 /// Moves the arm to a place that the words name.
@@ -71,9 +81,7 @@ fn start(cx: &mut Context, goal: MotionGoal, what: Text, correction: Option<Corr
         Ok(()) => {
             cx.model.motion = Motion::Moving { id, what, since_s: cx.model.now_s };
         }
-        Err(busy) => {
-            moved(cx, id, MotionOutcome::Failed(busy.into()));
-        }
+        Err(busy) => cx.report(Event::Moved { id, outcome: MotionOutcome::Failed(busy.into()) }),
     }
 }
 
@@ -94,7 +102,7 @@ fn go_to_capture(cx: &mut Context, id: CaptureId) {
     set_out(cx, goal, text!("pose of capture {id}", id = id));
 }
 
-pub(crate) fn moved(cx: &mut Context, id: MotionId, outcome: MotionOutcome) {
+fn moved(cx: &mut Context, id: MotionId, outcome: MotionOutcome) -> Option<Ended> {
     let what = match &cx.model.motion {
         Motion::Moving { id: moving, what, .. } if *moving == id => Some(what.clone()),
         _ => None,
@@ -104,10 +112,11 @@ pub(crate) fn moved(cx: &mut Context, id: MotionId, outcome: MotionOutcome) {
     }
     let what = what.unwrap_or_else(|| text!("the goal"));
     if cx.model.planning && cx.numbers.plan == Some(id) {
-        return plan_refused(&mut cx.model, &outcome);
+        return Some(Ended::Plan(outcome));
     }
     if cx.numbers.follow == Some(id) {
-        return follow_ended(&mut cx.model, &mut cx.numbers, outcome);
+        follow_ended(&mut cx.model, &mut cx.numbers, outcome);
+        return None;
     }
     match &outcome {
         MotionOutcome::Arrived => {}
@@ -125,9 +134,7 @@ pub(crate) fn moved(cx: &mut Context, id: MotionId, outcome: MotionOutcome) {
         }
     }
     // The late report of an earlier motion does not advance a sequence.
-    if cx.model.sequence_runs && id == cx.numbers.motion {
-        sequence_moved(cx, &outcome);
-    }
+    (cx.model.sequence_runs && id == cx.numbers.motion).then_some(Ended::Sequence(outcome))
 }
 
 /// A press of a jog button: one step, or the beginning of holding it.
@@ -174,9 +181,11 @@ fn jog_ended(model: &mut Model, why: Option<Text>) {
 /// A motion whose connection broke ended with it.
 pub(crate) fn motion_lost(cx: &mut Context) {
     if let Motion::Moving { id, .. } = cx.model.motion {
-        moved(cx, id, MotionOutcome::Failed(text!("the connection broke on the way")));
+        let outcome = MotionOutcome::Failed(text!("the connection broke on the way"));
+        cx.report(Event::Moved { id, outcome });
+    } else {
+        cx.model.motion = Motion::Idle;
     }
-    cx.model.motion = Motion::Idle;
 }
 
 /// The camera on the tip as calibrated, or else as given by the scene: only to choose the axes of jogging.

@@ -3,8 +3,9 @@
 use handeye_arm::JointValues;
 use handeye_plan::travel;
 
-use crate::model::{Model, MotionGoal};
+use crate::model::Model;
 use crate::text::Text;
+use handeye_link::MotionGoal;
 use handeye_wording::text;
 
 /// Travel of a joint [rad, m of a prismatic one] within which an arm counts as at the same place: less than the free space

@@ -10,13 +10,17 @@ use handeye_plan::guided::choose::Robot;
 
 use super::desk::{MotionQueue, MotionTask, Work};
 use super::jog_line::Held;
+use crate::connect::state::Link;
 use crate::guided::state::{Choice, GuideRequest};
-use crate::model::{FollowRequest, FollowStatus, Link, MotionId, MotionOutcome, Severity};
+use crate::messages::state::Severity;
+use crate::motion::state::MotionId;
 use crate::text::Text;
 use crate::track::follow::follow;
 use crate::track::follow_line::FollowLine;
+use crate::track::state::{FollowRequest, FollowStatus};
 use crate::worker::link::{Duty, Outlet};
 use crate::{guided, keep_out, motion, taught, track};
+use handeye_link::MotionOutcome;
 use handeye_link::{Cell, Connected, JogRequest, MotionPort, PortError, ViewsRequest, end_of_following};
 use handeye_wording::text;
 

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::RerunState;
+use crate::recording::state::RerunState;
 
 /// What the user wants of the recording for Rerun.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

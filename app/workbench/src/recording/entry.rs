@@ -8,7 +8,14 @@ use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_plan::Surroundings;
 use handeye_session::{CaptureId, Document};
 
-use crate::model::{CellFacts, FrameImages, FrameInfo, LiveDetection, Observed, Severity, Solved, Step, Tracked};
+use crate::capture::state::LiveDetection;
+use crate::live::state::{FrameImages, FrameInfo};
+use crate::messages::state::Severity;
+use crate::session::state::Observed;
+use crate::shell::state::Step;
+use crate::solve::state::Solved;
+use crate::track::state::Tracked;
+use handeye_link::CellFacts;
 
 /// Something to record.
 #[derive(Debug, Clone)]

@@ -6,7 +6,7 @@ use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_plan::Surroundings;
 use handeye_session::CaptureId;
 
-use crate::model::Step;
+use crate::shell::state::Step;
 
 /// What of the model was noted already.
 #[derive(Debug, Default)]

@@ -4,14 +4,15 @@ use std::sync::Arc;
 
 use super::command::{Command, Event};
 use super::recorded::Recorded;
-use crate::app::Numbers;
+use crate::app::context::Numbers;
 use crate::command::Event as AnyEvent;
-use crate::model::{Dialog, Model};
+use crate::model::Model;
 use crate::recording::{Entry, Recording};
+use crate::session::desk::SessionThreads;
+use crate::shell::state::Dialog;
 use crate::shell::update::set_dialog;
 use crate::solve::SolveOutcome;
 use crate::text::Language;
-use crate::worker::SessionThreads;
 use crate::{connect, live, session, solve, track};
 
 /// Does what is wanted of the recording.

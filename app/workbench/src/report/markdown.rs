@@ -1,7 +1,7 @@
 //! The report as Markdown: read next to the scene.
 
 use super::{Line, Section, sections};
-use crate::model::Solved;
+use crate::solve::state::Solved;
 
 /// The report of a calibration, with what is weak in it and what to do next.
 pub fn markdown(solved: &Solved) -> String {

@@ -17,7 +17,7 @@ use nalgebra::Vector3;
 pub use markdown::markdown;
 pub use page::{of_session, page, shared_camera};
 
-use crate::model::Solved;
+use crate::solve::state::Solved;
 use handeye_wording::{English, decimals, shown};
 
 /// What is reported about one thing. Numbers have their units.

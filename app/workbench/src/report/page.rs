@@ -3,7 +3,7 @@
 use handeye_result::CalibrationResult;
 
 use super::{Line, Section, camera, findings, headline, sections};
-use crate::model::Solved;
+use crate::solve::state::Solved;
 
 /// The page. It ends with a newline.
 pub fn page(solved: &Solved) -> String {

@@ -10,7 +10,7 @@ use handeye_coppeliasim::cell::ArmKinematics;
 use handeye_geometry::frames::{Base, Pose, Tip};
 use nalgebra::Isometry3;
 
-use crate::model::CellFacts;
+use handeye_link::CellFacts;
 
 /// The arm of the built-in scene.
 static BUILT_IN: LazyLock<Option<ArmKinematics>> = LazyLock::new(|| {

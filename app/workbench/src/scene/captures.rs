@@ -6,7 +6,7 @@ use handeye_geometry::statistics::median_high;
 use handeye_session::{CaptureId, CaptureRecord, Role};
 
 use super::Known;
-use crate::model::Solved;
+use crate::solve::state::Solved;
 
 /// A capture whose residual is this many times that of the median one has the worst colour. It is also where a view
 /// starts to be named in the findings.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::SceneView;
+use super::view::SceneView;
 
 /// What the user wants of the 3D pane.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -4,14 +4,9 @@ use handeye_cell::render::Shape;
 use handeye_geometry::frames::{Base, Pose, Tip};
 use nalgebra::{Point3, Vector3};
 
+use super::view::{AZIMUTH_RAD, ELEVATION_RAD, OPENING_RAD};
 use super::{Known, PosedArm, frustum_end, outline};
 
-/// Angle that the shorter side of a picture takes in: narrow enough that nothing is distorted at its edges \[rad\].
-pub const OPENING_RAD: f64 = 38.0 * std::f64::consts::PI / 180.0;
-/// Direction from the middle to the eye about z of the base, counted from its x: obliquely from the front \[rad\].
-pub const AZIMUTH_RAD: f64 = -35.0 * std::f64::consts::PI / 180.0;
-/// The same over the ground \[rad\].
-pub const ELEVATION_RAD: f64 = 22.0 * std::f64::consts::PI / 180.0;
 /// Room around the ball, as a part of its radius: the arm moves.
 const ROOM: f64 = 0.15;
 /// Length of the frustum of the camera, as it is drawn \[m\].

@@ -8,7 +8,9 @@ use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_geometry::targets::TargetSpec;
 
 use super::{BoardItem, CameraItem, Fixed, Item, PlannedItem, Role};
-use crate::model::{CellFacts, Model, Solved};
+use crate::model::Model;
+use crate::solve::state::Solved;
+use handeye_link::CellFacts;
 
 /// The ground truth of a simulated cell.
 #[derive(Debug, Clone)]

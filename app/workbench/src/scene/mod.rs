@@ -9,19 +9,21 @@ pub mod command;
 mod extent;
 mod known;
 pub(crate) mod update;
+pub(crate) mod view;
 
 pub use arm::{PosedArm, posed_arm};
 pub use captures::{BAD_AT_MEDIANS, CaptureItem, CaptureUse, Captures, outcome};
 pub use command::Command;
-pub use extent::{AZIMUTH_RAD, ELEVATION_RAD, Extent, OPENING_RAD};
+pub use extent::Extent;
 pub use known::{Known, Truth};
+pub use view::{AZIMUTH_RAD, ELEVATION_RAD, OPENING_RAD, SceneView};
 
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Camera, Frame, Pose, Target, Tip};
 use handeye_geometry::targets::TargetSpec;
 use nalgebra::{Isometry3, Point3};
 
-use crate::model::{Model, SceneView};
+use crate::model::Model;
 
 /// What something is fixed to.
 #[derive(Debug, Clone, Copy)]

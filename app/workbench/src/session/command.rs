@@ -9,7 +9,9 @@ use handeye_geometry::targets::TargetSpec;
 use handeye_session::CaptureId;
 use serde::{Deserialize, Serialize};
 
-use crate::model::{CapturePurpose, FolderListing, FrameImages, Observed, RecentSession, SessionState};
+use crate::capture::state::CapturePurpose;
+use crate::live::state::FrameImages;
+use crate::session::state::{FolderListing, Observed, RecentSession, SessionState};
 use crate::text::Text;
 
 /// What the user wants of the session.

@@ -20,8 +20,8 @@ use crate::worker::channels::Requests;
 use crate::worker::files::{self, FileTask};
 use crate::worker::link::Outlet;
 use crate::worker::newest::NewestWins;
+use crate::worker::shared::{Busy, Clock, JOIN_DEADLINE, MAX_EVENTS, MAX_REQUESTS, POLL, Waker};
 use crate::worker::started::Started;
-use crate::worker::{Busy, Clock, JOIN_DEADLINE, MAX_EVENTS, MAX_REQUESTS, POLL, Waker};
 
 /// Captures that may wait for the disk. The vision thread blocks when there are more, and so does the next capture.
 const MAX_CAPTURES: usize = 4;

@@ -4,6 +4,7 @@ pub(crate) mod archive;
 pub mod command;
 pub(crate) mod desk;
 pub mod facts;
+pub(crate) mod requests;
 pub mod start;
 pub(crate) mod state;
 pub(crate) mod update;

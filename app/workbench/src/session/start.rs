@@ -9,7 +9,7 @@ use handeye_geometry::targets::{Grid, TargetSpec};
 use handeye_session::{GroundTruth, SessionMeta};
 use nalgebra::Isometry3;
 
-use crate::model::Truth;
+use handeye_link::Truth;
 
 /// The board of the reference scene.
 pub const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });

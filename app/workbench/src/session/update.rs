@@ -9,19 +9,27 @@ use handeye_geometry::targets::TargetSpec;
 use handeye_session::{CaptureId, Edit, Role};
 
 use super::command::{Command, Event};
-use crate::app::{Context, Numbers, Reach, bounds_of};
+use crate::app::context::{Context, Numbers};
+use crate::app::reach::{Reach, bounds_of};
+use crate::capture::state::CapturePurpose;
 use crate::guided::update::forget_guided;
-use crate::model::{
-    ArmDoubt, CapturePurpose, Dialog, FrameImages, Model, Observed, RecentSession, Review, SessionState, Severity,
-};
+use crate::live::state::FrameImages;
+use crate::messages::state::Severity;
+use crate::model::Model;
+use crate::session::archive::{ArchiveTask, Beginning, timestamp_rfc3339};
+use crate::session::desk::SessionThreads;
+use crate::session::requests::{ask_archive, edit, list_folder, send_target};
 use crate::session::start;
+use crate::session::state::{Observed, RecentSession, Review, SessionState};
+use crate::shell::state::Dialog;
 use crate::shell::update::set_dialog;
+use crate::solve::observer::ObserveJob;
 use crate::solve::update::{forget_solve, solve_if_changed};
 use crate::taught::update::reference_poses;
 use crate::text::Text;
-use crate::worker::{
-    ArchiveTask, Beginning, FileTask, ObserveJob, SessionThreads, VisionTask, Workers, timestamp_rfc3339,
-};
+use crate::worker::files::FileTask;
+use crate::worker::threads::Workers;
+use handeye_link::ArmDoubt;
 use handeye_wording::text;
 
 /// Does what is wanted of the session.
@@ -89,18 +97,6 @@ pub(crate) fn prepare_session(model: &mut Model, desk: &SessionThreads) {
     }
 }
 
-fn ask_archive(model: &mut Model, desk: &SessionThreads, task: ArchiveTask) {
-    let asked = desk.archive(task);
-    if asked.is_err() {
-        model.notify(Severity::Error, text!("The disk does not keep up: nothing was changed. Try again in a moment"));
-    }
-}
-
-/// Changes the document. It is shown when it is on the disk.
-pub(crate) fn edit(model: &mut Model, desk: &SessionThreads, edit: Edit) {
-    ask_archive(model, desk, ArchiveTask::Edit(Box::new(edit)));
-}
-
 fn undo(model: &mut Model, desk: &SessionThreads) {
     if model.session.undo.is_some() {
         ask_archive(model, desk, ArchiveTask::Undo);
@@ -159,11 +155,6 @@ pub(crate) fn open_or_begin(model: &mut Model, desk: &SessionThreads, folder: Pa
 fn save_as(model: &mut Model, desk: &SessionThreads, folder: PathBuf) {
     model.opening = true;
     ask_archive(model, desk, ArchiveTask::SaveAs(folder));
-}
-
-pub(crate) fn list_folder(model: &mut Model, desk: &SessionThreads, folder: PathBuf) {
-    let asked = desk.files(FileTask::List(folder));
-    model.notify_if_refused(text!("The folder was not read"), asked);
 }
 
 /// Shows a folder in the system's file manager.
@@ -289,18 +280,4 @@ fn reviewed(model: &mut Model, id: CaptureId, images: Option<Arc<FrameImages>>) 
     if let Some(review) = model.review.as_mut().filter(|review| review.id == id) {
         review.images = images;
     }
-}
-
-/// Notifies the threads that look for the board of the target.
-pub(crate) fn send_target(model: &mut Model, workers: &Workers) {
-    let target = model.document().meta.target;
-    let asked = workers.ask_vision(VisionTask::SetTarget(target));
-    model.notify_if_refused(text!("The target was not changed"), asked);
-}
-
-/// Notifies them of the camera's intrinsics.
-pub(crate) fn send_intrinsics(model: &mut Model, workers: &Workers) {
-    let Some(intrinsics) = model.intrinsics() else { return };
-    let asked = workers.ask_vision(VisionTask::SetIntrinsics(intrinsics));
-    model.notify_if_refused(text!("The camera was not changed"), asked);
 }

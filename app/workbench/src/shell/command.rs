@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::{Dialog, Pane, RotationFormat, Step, ThemeChoice};
+use crate::shell::state::{Dialog, Pane, Step};
+use crate::shell::view::{RotationFormat, ThemeChoice};
 use crate::text::Language;
 
 /// What the user wants of the window around the panes.

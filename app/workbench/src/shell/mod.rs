@@ -3,5 +3,6 @@
 pub mod command;
 pub(crate) mod state;
 pub(crate) mod update;
+pub(crate) mod view;
 
 pub use command::Command;

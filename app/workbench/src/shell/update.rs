@@ -2,9 +2,10 @@
 
 use super::command::Command;
 use crate::import::update::forget_import;
-use crate::model::{Dialog, Model};
-use crate::session::update::list_folder;
-use crate::worker::SessionThreads;
+use crate::model::Model;
+use crate::session::desk::SessionThreads;
+use crate::session::requests::list_folder;
+use crate::shell::state::Dialog;
 
 /// Does what is wanted of the window.
 pub(crate) fn apply(model: &mut Model, desk: &SessionThreads, command: Command) {

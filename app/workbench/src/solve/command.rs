@@ -5,7 +5,8 @@ use std::sync::Arc;
 use handeye_geometry::progress::Stage;
 use serde::{Deserialize, Serialize};
 
-use crate::model::{JobId, Solved, WorkBox};
+use crate::solve::state::{JobId, Solved};
+use crate::solve::tip_box::WorkBox;
 use crate::text::Text;
 
 /// What the user wants of the calibration.

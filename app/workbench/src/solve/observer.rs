@@ -9,9 +9,10 @@ use handeye_geometry::targets::TargetSpec;
 use handeye_session::{CaptureId, CaptureRecord};
 
 use crate::capture::thumbnail;
-use crate::model::{Observed, Severity};
+use crate::messages::state::Severity;
 use crate::observe;
 use crate::session;
+use crate::session::state::Observed;
 use crate::text::Text;
 use crate::worker::link::Outlet;
 use handeye_wording::text;

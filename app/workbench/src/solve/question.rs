@@ -2,7 +2,7 @@
 
 use handeye_session::{CaptureId, Role};
 
-use crate::model::Goal;
+use crate::shell::view::Goal;
 
 /// What a calibration depends on. When it changes, there is something to solve.
 #[derive(Debug, Clone, PartialEq)]

@@ -9,7 +9,7 @@ use handeye_session::Document;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
-use crate::model::Solved;
+use crate::solve::state::Solved;
 
 /// Half a side of the box that is judged before one is chosen \[m\].
 const HALF_SIDE_M: f64 = 0.1;

@@ -11,15 +11,19 @@ use handeye_session::{CaptureId, Document, SessionObservations};
 
 use super::command::{Command, Event};
 use super::question::Question;
-use crate::app::{Context, Numbers};
+use crate::app::context::{Context, Numbers};
 use crate::export::update::preview_exports;
-use crate::model::{
-    BoxState, Goal, JobId, Model, Severity, SolveState, SolveStatus, WorkBox, box_in_camera, judge_box,
-};
-use crate::session::update::send_intrinsics;
+use crate::messages::state::Severity;
+use crate::model::Model;
+use crate::session::archive::ArchiveTask;
+use crate::session::desk::SessionThreads;
+use crate::session::requests::send_intrinsics;
+use crate::shell::view::Goal;
 use crate::solve::SolveOutcome;
+use crate::solve::state::{JobId, SolveState, SolveStatus};
+use crate::solve::tip_box::{BoxState, WorkBox, in_camera as box_in_camera, judge_box};
+use crate::solve::worker::SolveJob;
 use crate::track::update::{send_tracking, set_tracking};
-use crate::worker::{ArchiveTask, SessionThreads, SolveJob};
 use handeye_wording::text;
 
 /// Does what is wanted of the calibration.

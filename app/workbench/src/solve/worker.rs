@@ -17,11 +17,12 @@ use handeye_geometry::targets::observation::View;
 use handeye_result::{ArmEstimate, CalibrationResult, DepthSummary, VerificationSummary, solve_options};
 use handeye_session::CaptureId;
 
-use crate::model::{Corrected, JobId, Solved, Truth};
 use crate::solve;
 use crate::solve::SolveOutcome;
+use crate::solve::state::{Corrected, JobId, Solved};
 use crate::truth;
 use crate::worker::link::Outlet;
+use handeye_link::Truth;
 use handeye_wording::text;
 
 /// Progress is reported when it has advanced by this much: a window that is drawn for every step would slow the solve

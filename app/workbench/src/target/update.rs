@@ -1,14 +1,19 @@
 //! Another target, and the target on paper.
 
+use std::path::PathBuf;
+
 use handeye_geometry::targets::TargetSpec;
+use handeye_print::Page;
 use handeye_session::Edit;
 
 use super::command::Command;
 use crate::guided::update::forget_guided;
 use crate::model::Model;
-use crate::session::update::edit;
-use crate::target::print::print_target;
-use crate::worker::{SessionThreads, Workers};
+use crate::session::desk::SessionThreads;
+use crate::session::requests::edit;
+use crate::worker::files::FileTask;
+use crate::worker::threads::Workers;
+use handeye_wording::text;
 
 /// Does what is wanted of the target.
 pub(crate) fn apply(model: &mut Model, workers: &Workers, desk: &SessionThreads, command: Command) {
@@ -21,4 +26,23 @@ pub(crate) fn apply(model: &mut Model, workers: &Workers, desk: &SessionThreads,
 fn set_target(model: &mut Model, workers: &Workers, desk: &SessionThreads, target: TargetSpec) {
     forget_guided(model, workers);
     edit(model, desk, Edit::SetTarget(target));
+}
+
+/// The name of its file, which distinguishes boards.
+fn file_name(target: &TargetSpec) -> String {
+    let size = match target {
+        TargetSpec::AprilTag(tag) => format!("{}", tag.id),
+        TargetSpec::AprilGrid(board) => format!("{}x{}", board.columns, board.rows),
+        _ => format!("{}x{}", target.grid().columns, target.grid().rows),
+    };
+    format!("{}_{size}.pdf", target.kind())
+}
+
+/// Writes the board of the session for a printer, into the session or next to the others.
+fn print_target(model: &mut Model, desk: &SessionThreads, page: Page) {
+    let target = model.document().meta.target;
+    let folder: &PathBuf = model.session.folder.as_ref().unwrap_or(&model.sessions);
+    let file = folder.join(file_name(&target));
+    let asked = desk.files(FileTask::PrintTarget { target, page, file });
+    model.notify_if_refused(text!("The board was not written"), asked);
 }

@@ -6,7 +6,8 @@ use handeye_coppeliasim::cell::{ArmKinematics, CellPart};
 use handeye_dataset::taught_poses::{TaughtJoint, TaughtOn, TaughtPose};
 use handeye_geometry::targets::TargetSpec;
 
-use crate::model::{CellSource, Model, Moves};
+use crate::model::Model;
+use handeye_link::{CellSource, Moves};
 
 impl Model {
     /// The cell that poses are taught on now, before this target; `None` before it is connected.

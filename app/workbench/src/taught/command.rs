@@ -6,7 +6,8 @@ use handeye_arm::JointValues;
 use handeye_dataset::taught_poses::TaughtPose;
 use serde::{Deserialize, Serialize};
 
-use crate::model::{CapturePurpose, MotionId};
+use crate::capture::state::CapturePurpose;
+use crate::motion::state::MotionId;
 use crate::text::Text;
 
 /// What the user wants of taught poses and sequences.
@@ -55,6 +56,12 @@ pub enum Command {
     StopSequence,
     /// Plan poses that are not in the fit, visit them, and capture for verification at each.
     VerifyAtPlanned,
+    /// Allow the move that is waiting.
+    ConfirmMove,
+    /// Skip the move that waits; a sequence continues with another pose.
+    SkipMove,
+    /// Whether each move to a chosen pose waits to be confirmed.
+    SetConfirmMoves(bool),
 }
 
 /// What has happened to taught poses and sequences.

@@ -1,7 +1,9 @@
 //! Taught poses, and the sequence that visits them.
 
+pub(crate) mod break_off;
 mod cell;
 pub mod command;
+mod let_go;
 pub(crate) mod sequence;
 pub mod update;
 

@@ -2,22 +2,26 @@
 
 use handeye_arm::JointValues;
 use handeye_coppeliasim::cell::BoardInView;
+use handeye_dataset::taught_poses::Goal;
 use handeye_estimate::handeye::HandEye;
 
-use crate::app::{Context, Numbers};
+use crate::app::context::{Context, Numbers};
+use crate::capture::state::{CapturePurpose, CaptureRefused};
 use crate::capture::update::{capture, refuses_without_robot};
-use crate::guided::update::{
-    continue_guided, guided_arrived, guided_is_over, guided_visited, guided_waits, guided_was_refused,
-};
-use crate::model::{
-    CapturePurpose, CaptureRefused, Model, MotionGoal, MotionId, MotionOutcome, Pane, PoseSequence, Severity,
-    StopOutcome,
-};
+use crate::guided::progress::{guided_arrived, guided_is_over, guided_visited, guided_waits, guided_was_refused};
+use crate::messages::state::Severity;
+use crate::model::Model;
+use crate::motion;
 use crate::motion::ask::set_out;
 use crate::motion::rest::stop;
-use crate::taught::update::go_to_taught;
+use crate::motion::state::MotionId;
+use crate::session::state::{PoseSequence, StopOutcome};
+use crate::shell::state::Pane;
+use crate::taught::break_off::{break_off, pane_of};
 use crate::text::Text;
-use crate::worker::{ViewsRequest, Workers};
+use crate::worker::threads::Workers;
+use handeye_link::ViewsRequest;
+use handeye_link::{MotionGoal, MotionOutcome};
 use handeye_wording::text;
 
 /// Poses that are planned for verification: enough for an average and a scatter, and over within a minute or two.
@@ -47,23 +51,6 @@ pub(crate) fn begin_sequence(cx: &mut Context, sequence: PoseSequence) {
     cx.model.sequence_runs = true;
     cx.model.let_go = false;
     next_stop(cx);
-}
-
-/// Continues an interrupted sequence: the pose where it was interrupted is visited again.
-pub(crate) fn continue_sequence(cx: &mut Context) {
-    if cx.model.capture.is_some() {
-        // It would be taken for the capture of the pose.
-        return cx.model.notify(Severity::Warning, text!("A capture is under way: wait until it is kept"));
-    }
-    if continue_guided(cx) {
-        return;
-    }
-    let left = cx.model.sequence.as_ref().and_then(PoseSequence::current);
-    if left.is_some() && !cx.model.sequence_runs && !cx.model.planning {
-        cx.model.sequence_runs = true;
-        cx.model.let_go = false;
-        next_stop(cx);
-    }
 }
 
 /// Plans poses that differ from all captures, for verification.
@@ -222,23 +209,26 @@ pub(crate) fn sequence_refused(cx: &mut Context, refused: &CaptureRefused) {
     }
 }
 
-/// Interrupts a sequence, and reports why if that is known.
-pub(crate) fn break_off(model: &mut Model, why: Option<Text>) {
-    model.sequence_runs = false;
-    model.asked = None;
-    let pane = model.sequence.as_ref().map_or(Pane::Taught, pane_of);
-    let reported = match why {
-        Some(why) => text!("The sequence was broken off, and what was captured is kept: {why}", why = why),
-        None => text!("The sequence was broken off; what was captured is kept"),
-    };
-    model.notify_in(pane, Severity::Warning, reported);
+pub(crate) fn go_to_taught(cx: &mut Context, name: &str) {
+    let what = text!("pose {name}", name = name);
+    let goal = cx.model.taught().into_iter().find(|pose| pose.name == name).map(|pose| match &pose.goal {
+        Goal::Tip(base_from_tip) => Some(MotionGoal::Tip(*base_from_tip)),
+        Goal::Joints(joints) => JointValues::try_from(&joints[..]).ok().map(MotionGoal::Joints),
+    });
+    match goal {
+        Some(Some(goal)) => set_out(cx, goal, what),
+        Some(None) => {
+            let why = text!("no arm has as many joints as the pose");
+            refuse(cx, why);
+        }
+        None => {
+            let why = text!("it is no longer taught");
+            refuse(cx, why);
+        }
+    }
 }
 
-/// The pane that reports how it went.
-fn pane_of(sequence: &PoseSequence) -> Pane {
-    match sequence {
-        sequence if sequence.guided.is_some() => Pane::Poses,
-        sequence if sequence.is_planned() => Pane::Verify,
-        _ => Pane::Taught,
-    }
+fn refuse(cx: &mut Context, why: Text) {
+    let id = cx.numbers.motion;
+    cx.report(motion::Event::Moved { id, outcome: MotionOutcome::Refused(why) });
 }

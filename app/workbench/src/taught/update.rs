@@ -2,19 +2,23 @@
 
 use std::path::{Path, PathBuf};
 
-use handeye_arm::{JointKind, JointValues};
+use handeye_arm::JointKind;
 use handeye_dataset::taught_poses::{Goal, TaughtPose, TaughtPoses};
 use handeye_session::{Edit, TaughtChange};
 
 use super::command::{Command, Event};
-use crate::app::Context;
-use crate::model::{Model, MotionGoal, MotionOutcome, Severity};
-use crate::motion::ask::{may_set_out, set_out};
-use crate::motion::update::moved;
+use crate::app::context::Context;
+use crate::guided::update::continue_guided;
+use crate::messages::state::Severity;
+use crate::model::Model;
+use crate::motion::ask::may_set_out;
+use crate::session::desk::SessionThreads;
+use crate::session::requests::edit;
 use crate::session::start::REFERENCE_POSES;
-use crate::session::update::edit;
-use crate::taught::sequence::{continue_sequence, plan_verification, planned, run_sequence, stop_sequence};
-use crate::worker::{FileTask, SessionThreads};
+use crate::session::state::PoseSequence;
+use crate::taught::let_go::{confirm_move, set_confirm_moves, skip_move};
+use crate::taught::sequence::{go_to_taught, next_stop, plan_verification, planned, run_sequence, stop_sequence};
+use crate::worker::files::FileTask;
 use handeye_wording::text;
 
 pub fn reference_poses() -> Vec<TaughtPose> {
@@ -42,8 +46,28 @@ pub(crate) fn apply(cx: &mut Context, command: Command) {
         Command::GoTo(name) => visit_taught(cx, &name),
         Command::RunSequence { purpose } => run_sequence(cx, purpose),
         Command::ContinueSequence => continue_sequence(cx),
+        Command::ConfirmMove => confirm_move(cx),
+        Command::SkipMove => skip_move(cx),
+        Command::SetConfirmMoves(confirm) => set_confirm_moves(cx, confirm),
         Command::StopSequence => stop_sequence(&mut cx.model, &cx.workers),
         Command::VerifyAtPlanned => plan_verification(&mut cx.model, &cx.workers, &mut cx.numbers),
+    }
+}
+
+/// Continues an interrupted sequence: the pose where it was interrupted is visited again.
+fn continue_sequence(cx: &mut Context) {
+    if cx.model.capture.is_some() {
+        // It would be taken for the capture of the pose.
+        return cx.model.notify(Severity::Warning, text!("A capture is under way: wait until it is kept"));
+    }
+    if continue_guided(cx) {
+        return;
+    }
+    let left = cx.model.sequence.as_ref().and_then(PoseSequence::current);
+    if left.is_some() && !cx.model.sequence_runs && !cx.model.planning {
+        cx.model.sequence_runs = true;
+        cx.model.let_go = false;
+        next_stop(cx);
     }
 }
 
@@ -169,25 +193,6 @@ fn export_taught(model: &mut Model, desk: &SessionThreads, file: PathBuf) {
 fn visit_taught(cx: &mut Context, name: &str) {
     if may_set_out(&mut cx.model) {
         go_to_taught(cx, name);
-    }
-}
-
-pub(crate) fn go_to_taught(cx: &mut Context, name: &str) {
-    let what = text!("pose {name}", name = name);
-    let goal = cx.model.taught().into_iter().find(|pose| pose.name == name).map(|pose| match &pose.goal {
-        Goal::Tip(base_from_tip) => Some(MotionGoal::Tip(*base_from_tip)),
-        Goal::Joints(joints) => JointValues::try_from(&joints[..]).ok().map(MotionGoal::Joints),
-    });
-    match goal {
-        Some(Some(goal)) => set_out(cx, goal, what),
-        Some(None) => {
-            let why = text!("no arm has as many joints as the pose");
-            moved(cx, cx.numbers.motion, MotionOutcome::Refused(why));
-        }
-        None => {
-            let why = text!("it is no longer taught");
-            moved(cx, cx.numbers.motion, MotionOutcome::Refused(why));
-        }
     }
 }
 

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::{BoardMotion, FollowRequest, FollowStatus, Tracked};
 use crate::text::Text;
+use crate::track::state::{BoardMotion, FollowRequest, FollowStatus, Tracked};
 
 /// What the user wants of tracking and following the board.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -5,7 +5,7 @@ use handeye_coppeliasim::cell::{FollowEnd, FollowMoment, FollowRequest as ArmReq
 use handeye_link::{MotionGoal, MotionOutcome, MotionPort, PortError, Room};
 
 use super::follow_line::FollowLine;
-use crate::model::FollowRequest;
+use crate::track::state::FollowRequest;
 
 /// Makes the arm do what is requested about the tracked board, from a place where it has room if that is requested, to which it
 /// moves at a share of its fastest speed; `makes_room` is notified beforehand. Returns when the arm is at rest: how following

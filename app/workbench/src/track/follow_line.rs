@@ -9,8 +9,8 @@ use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_track::{Estimate, Keep, Rest, Setup, State, TipGoal, Update};
 
 use super::worker::TrackedBy;
-use crate::model::{FollowRequest, FollowStatus};
 use crate::text::Text;
+use crate::track::state::{FollowRequest, FollowStatus};
 use handeye_wording::text;
 
 /// How far \[s\] the motion of the board is extrapolated from the newest image: a few images, so that a late one does

@@ -5,15 +5,21 @@ use std::sync::Arc;
 use handeye_track::{MotionModel, Setup};
 
 use super::command::{Command, Event};
-use crate::app::Numbers;
-use crate::model::{
-    BoardMotion, Corrected, FollowRequest, FollowStatus, MAX_TRACK_POINTS, Model, Motion, MotionId, MotionOutcome,
-    Pane, Severity, TrackPoint, Tracked,
-};
+use crate::app::context::Numbers;
+use crate::connect::worker::ControlTask;
+use crate::messages::state::Severity;
+use crate::model::Model;
 use crate::motion::correction::{corrected, helpful};
+use crate::motion::state::{Motion, MotionId};
+use crate::shell::state::Pane;
+use crate::solve::state::Corrected;
 use crate::text::Text;
+use crate::track::state::{BoardMotion, FollowRequest, FollowStatus, MAX_TRACK_POINTS, TrackPoint, Tracked};
 use crate::track::worker::TrackedBy;
-use crate::worker::{ControlTask, Request, VisionTask, Workers};
+use crate::worker::link::Request;
+use crate::worker::threads::Workers;
+use crate::worker::vision::VisionTask;
+use handeye_link::MotionOutcome;
 use handeye_wording::text;
 
 /// χ² of three degrees of freedom at 95 %, as a radius.

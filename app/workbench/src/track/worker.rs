@@ -9,7 +9,7 @@ use handeye_geometry::targets::TargetSpec;
 use handeye_track::{Image, Setup, TrackError as CannotTrack, Tracker};
 
 use super::follow_line::FollowLine;
-use crate::model::{TrackError, Tracked};
+use crate::track::state::{TrackError, Tracked};
 use crate::worker::rate::RateMeter;
 
 /// What tracks, and the arm with its errors where tip poses are corrected for them: the board is then where it really is in the base.

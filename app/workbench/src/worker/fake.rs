@@ -15,11 +15,12 @@ use handeye_plan::guided::choose::Robot;
 use image::{Rgb, RgbImage};
 use nalgebra::Isometry3;
 
-use crate::model::{BoardMotion, CellFacts, MotionGoal, MotionOutcome, Moves, RobotState, Simulation};
 use crate::text::Text;
+use crate::track::state::BoardMotion;
 use handeye_link::{
     CameraPort, Cell, Connected, ControlPort, JogRequest, MotionPort, Newest, PortError, RawFrame, Room, ViewsRequest,
 };
+use handeye_link::{CellFacts, MotionGoal, MotionOutcome, Moves, RobotState, Simulation};
 use handeye_wording::text;
 
 /// Width and height of the fake images in pixels.
@@ -73,7 +74,7 @@ pub struct Script {
     pub board_hidden: bool,
     /// Lines that it returns whenever it is asked.
     pub lines: usize,
-    /// How often it was asked for them.
+    /// How often they were requested.
     pub asked_for_lines: usize,
 }
 
@@ -176,7 +177,7 @@ impl ControlPort for FakeCell {
         let (width, height) = SIZE;
         Ok(CellFacts {
             joints: vec![
-                crate::model::JointFacts {
+                handeye_link::JointFacts {
                     kind: JointKind::Revolute,
                     range: Some([-std::f64::consts::TAU, std::f64::consts::TAU])
                 };

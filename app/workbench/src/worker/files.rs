@@ -16,10 +16,11 @@ use handeye_result::CalibrationResult;
 use handeye_session::{CaptureRecord, Session};
 
 use super::link::Outlet;
+use crate::export::state::{PreviewFile, Written};
 use crate::live::depth;
-use crate::model::{
-    ColouredDepth, FolderEntry, FolderKind, FolderListing, FrameImages, PreviewFile, Severity, Written,
-};
+use crate::live::state::{ColouredDepth, FrameImages};
+use crate::messages::state::Severity;
+use crate::session::state::{FolderEntry, FolderKind, FolderListing};
 use crate::settings::SettingsWrite;
 use crate::text::Text;
 use crate::{export, keep_out, messages, session, taught};

@@ -8,7 +8,8 @@ use handeye_coppeliasim::CancelToken;
 use super::reconnect::Reconnect;
 use super::{Clock, Waker};
 use crate::command::Event;
-use crate::model::{Link, Severity};
+use crate::connect::state::Link;
+use crate::messages::state::Severity;
 use crate::text::Text;
 use crate::{connect, messages};
 use handeye_link::{Cell, Connected, PortError};
@@ -125,7 +126,7 @@ impl<D: Duty> LinkLoop<'_, D> {
         }
     }
 
-    fn report(&self, state: crate::model::LinkState) {
+    fn report(&self, state: crate::connect::state::LinkState) {
         tracing::debug!(link = ?D::LINK, ?state, "link");
         self.outlet.report(connect::Event::Link { link: D::LINK, state });
     }

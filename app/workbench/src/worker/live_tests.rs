@@ -14,11 +14,13 @@ use handeye_server::{CellConfig, CellServer};
 use handeye_wire as wire;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-use super::fake::FakeCell;
 use super::motion_tests::Bench;
 use super::*;
 use crate::model::{Axis, JogFrame, Link, LinkState, MotionGoal, MotionOutcome};
+use crate::motion::jog_line::HELD_S;
 use crate::text::Language;
+use crate::worker::fake::FakeCell;
+use handeye_link::{CameraPort, Connected, ControlPort, MotionPort, PortError, RemoteCell};
 
 /// Only a failure takes this long.
 const PATIENCE: Duration = Duration::from_mins(1);

@@ -6,14 +6,16 @@ use std::sync::PoisonError;
 
 use crossbeam_channel::Receiver;
 
-use super::fake::{FakeCell, FakeMotions};
 use super::*;
 use crate::model::{CellFacts, FollowRequest, FollowStatus, Link, LinkState, MotionGoal, MotionOutcome};
-use crate::motion::correction::Correction;
+use crate::motion::jog_line::HELD_S;
+use crate::motion::state::Correction;
 use crate::testing::sample;
 use crate::text::{Language, Text};
 use crate::track::worker::TrackedBy;
+use crate::worker::fake::{FakeCell, FakeMotions};
 use crate::{connect, messages, motion, taught, track};
+use handeye_link::{PortError, Room};
 
 /// A healthy worker answers within milliseconds; this is for a machine that is busy.
 const PATIENCE: Duration = Duration::from_mins(1);

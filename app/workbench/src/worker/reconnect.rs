@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
-use crate::model::{CellSource, LinkState};
+use crate::connect::state::LinkState;
 use crate::text::Text;
+use handeye_link::CellSource;
 use handeye_link::PortError;
 
 /// Pauses between tries. The user who starts the simulator waits for the first ones; a machine that is off for the

@@ -3,11 +3,12 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, bounded};
 
-use super::fake::FakeCell;
 use super::*;
 use crate::model::{Link, LinkState, Severity, Simulation};
 use crate::text::Text;
+use crate::worker::fake::FakeCell;
 use crate::{connect, live, messages, motion};
+use handeye_link::PortError;
 
 /// A healthy worker answers within milliseconds; this is for a machine that is busy.
 const PATIENCE: Duration = Duration::from_secs(20);

@@ -14,7 +14,7 @@
 //! }
 //! ```
 //!
-//! The fit has none:
+//! The fit states no error:
 //!
 //! ```compile_fail
 //! use handeye_estimate::Fit;
@@ -29,16 +29,13 @@ use std::ops::Deref;
 
 use nalgebra::Point3;
 
-use super::doctor::{self, Diagnosis};
-use super::findings::FindingOptions;
-use crate::handeye::HandEyeError;
+use super::diagnosis::Diagnosis;
 use crate::handeye::joint::SmallSample;
 use crate::reach_error::{Reach, ReachErrors};
 use crate::robot_accuracy::ReachByAccuracy;
 use crate::stated_uncertainty::{Alternative, StatedUncertainty};
-use crate::{self as estimate, CalibrateError, Fit, LinkCovariances, Method, Observations, Options, resolution};
+use crate::{Fit, LinkCovariances, resolution};
 use handeye_geometry::point_error;
-use handeye_geometry::progress::Work;
 
 /// A fit, what was found about it, and the error that may be stated for it.
 #[derive(Debug, Clone)]
@@ -46,56 +43,11 @@ pub struct Calibration {
     pub(super) fit: Fit,
     pub(super) stated: StatedUncertainty,
     pub(super) reach: Option<Reach>,
-    /// Where that is not known and the accuracy of the robot is.
+    /// Set where `reach` is not known and the accuracy of the robot is.
     pub(super) reach_by_accuracy: Option<ReachByAccuracy>,
-    /// Of either, at the target: it is asked for often.
+    /// Reach errors by either of the two at the target, kept because they are often needed.
     pub(super) reach_at_target: Option<ReachErrors>,
     pub(super) diagnosis: Diagnosis,
-}
-
-/// Calibrates from observations, and examines the answer.
-///
-/// `work` is a `&CancelToken`, or a [`Work`] to follow the progress too. What it needs is said of [`estimate::fit`].
-///
-/// # Errors
-/// [`CalibrateError`] says what is missing and what to do; [`HandEyeError::Cancelled`] inside it when `work` was.
-pub fn calibrate<'a>(
-    observations: &Observations,
-    method: Method,
-    work: impl Into<Work<'a>>,
-) -> Result<Calibration, CalibrateError> {
-    calibrate_with(observations, method, Options::default(), &FindingOptions::default(), work)
-}
-
-/// As [`calibrate`], with options and what is wanted of the answer.
-///
-/// # Errors
-/// As [`calibrate`].
-pub fn calibrate_with<'a>(
-    observations: &Observations,
-    method: Method,
-    options: Options,
-    wanted: &FindingOptions<'_>,
-    work: impl Into<Work<'a>>,
-) -> Result<Calibration, CalibrateError> {
-    let work = work.into();
-    let fit = estimate::fit_with(observations, method, options, work)?;
-    examine(observations, fit, wanted, work.cancel)
-}
-
-/// Examines a fit of these observations: what contradicts it, and which error may be stated in spite of that.
-///
-/// # Errors
-/// [`HandEyeError::Cancelled`]: half an examination states nothing.
-pub fn examine<'a>(
-    observations: &Observations,
-    fit: Fit,
-    wanted: &FindingOptions<'_>,
-    work: impl Into<Work<'a>>,
-) -> Result<Calibration, CalibrateError> {
-    let work = work.into();
-    let calibration = doctor::examined(observations, fit, wanted, &work);
-    if work.is_cancelled() { Err(HandEyeError::Cancelled.into()) } else { Ok(calibration) }
 }
 
 impl Calibration {
@@ -104,7 +56,7 @@ impl Calibration {
         &self.diagnosis
     }
 
-    /// What was found, by itself.
+    /// What was found, without the calibration.
     pub fn into_diagnosis(self) -> Diagnosis {
         self.diagnosis
     }
@@ -115,11 +67,11 @@ impl Calibration {
     }
 
     /// Expected error of a measured point where the camera saw the target, 95 %, metres: 95 % of errors are below. It
-    /// counts the hand-eye transform alone; the noise of a later robot pose or image comes on top. With an arm whose joints are known it
-    /// is against the arm as it really is, which beside an arm is seldom what is wanted: what shifts all that the arm reports in a part
-    /// of its workspace shifts the camera alike, and its tool meets what the camera sees there, see [`Self::promised`]. With joints that
-    /// are not known it is against the poses that the robot reports. Of the joint estimate only, and `None` when the data contradict
-    /// themselves.
+    /// counts the hand-eye transform alone; the noise of a later robot pose or image comes on top. With an arm whose joints are
+    /// known it is against the arm as it really is, which is seldom what is wanted: an error that shifts all poses reported in a
+    /// part of the workspace shifts the camera equally, and the tool still meets what the camera sees there, see
+    /// [`Self::promised`]. With joints that are not known it is against the poses that the robot reports. Of the joint estimate
+    /// only, and `None` when the data contradict themselves.
     pub fn tip_error_95_m(&self) -> Option<f64> {
         self.error_95_m(&self.joint.as_ref()?.reference_point)
     }
@@ -135,8 +87,8 @@ impl Calibration {
         Some(by_arm.map_or(by_poses, |by_arm| by_poses.max(by_arm)))
     }
 
-    /// Which error may be stated of the answer by reported poses. What was found is counted from the answer that goes with the errors of
-    /// the arm where these are known.
+    /// Which error may be stated of the answer by reported poses. Findings refer to the answer that belongs to the errors of the
+    /// arm where these are known.
     fn stated_of_answer(&self) -> Cow<'_, StatedUncertainty> {
         match self.fit.arm().zip(self.hand_eye.as_ref()) {
             Some((arm, answer)) => {
@@ -146,13 +98,13 @@ impl Calibration {
         }
     }
 
-    /// How near a tool arrives, and how the arm stands; `None` where its joints are not known, or nothing may be stated.
+    /// How near a tool arrives with this arm; `None` where its joints are not known, or nothing may be stated.
     pub fn reach(&self) -> Option<&Reach> {
         self.reach.as_ref()
     }
 
-    /// How far the errors of the arm put the answer from where the camera really is on it, at a point where it saw the target, metres, where
-    /// that is most of the stated error: more views do not lower it.
+    /// Error of the answer due to the errors of the arm, against the true pose of the camera on it, at a point where it saw the
+    /// target, metres, where that is most of the stated error: more views do not lower it.
     pub(crate) fn moved_by_arm_m(&self) -> Option<f64> {
         let ([hand_eye, _], law) = self.of_links_by_arm()?;
         let point = &self.joint.as_ref()?.reference_point;
@@ -161,15 +113,15 @@ impl Calibration {
         (is_by_arm && moved_m > 0.5 * error_m).then_some(moved_m)
     }
 
-    /// What the errors of the arm say of both links, and how their errors are distributed; `None` where its joints are not known, and
-    /// where views left out contradict them.
+    /// What the errors of the arm imply for both links, and how their errors are distributed; `None` where its joints are not
+    /// known, and where views left out contradict them.
     fn of_links_by_arm(&self) -> Option<([Alternative; 2], SmallSample)> {
         let arm = self.fit.arm()?;
         Some((arm.of_links(self.hand_eye.as_ref()?), arm.small_sample))
     }
 
-    /// Covariances of the two rigid links as they may be stated: those of the fit, or with an arm whose joints are known the mean squares
-    /// of what they are off on the arm as it really is, whichever makes the larger error of a measured point.
+    /// Covariances of the two rigid links as they may be stated: those of the fit, or with an arm whose joints are known the mean
+    /// squares of their errors on the true arm, whichever makes the larger error of a measured point.
     pub fn link_covariances(&self) -> Option<LinkCovariances> {
         let by_poses = self.fit.link_covariances?;
         let Some(point) = self.joint.as_ref().map(|joint| joint.reference_point) else { return Some(by_poses) };
@@ -179,7 +131,7 @@ impl Calibration {
         Some(by_arm.filter(|by_arm| size(by_arm) > size(&by_poses)).unwrap_or(by_poses))
     }
 
-    /// How far what was found and the answer does not count on would move a point where the camera saw the target, metres: a
+    /// How far findings that the answer does not account for would move a point where the camera saw the target, metres: a
     /// part of [`Self::tip_error_95_m`]. `None` where nothing of the kind was found, or nothing may be stated.
     pub fn moved_m(&self) -> Option<f64> {
         let joint = self.joint.as_ref()?;
@@ -207,7 +159,7 @@ impl Deref for Calibration {
     }
 }
 
-/// Made up for tests of what is shown of a calibration.
+/// Calibrations made up for tests of how they are shown.
 #[cfg(any(test, feature = "testing"))]
 mod made_up {
     use std::ops::DerefMut;
@@ -215,14 +167,14 @@ mod made_up {
     use super::{Calibration, Diagnosis, Fit, StatedUncertainty};
 
     impl Calibration {
-        /// As if nothing had been found.
+        /// A calibration as if nothing had been found.
         pub fn as_modelled(fit: Fit) -> Self {
             let stated = StatedUncertainty::AsModelled;
             let diagnosis = Diagnosis::default();
             Self { fit, stated, reach: None, reach_by_accuracy: None, reach_at_target: None, diagnosis }
         }
 
-        /// With another error that may be stated.
+        /// The same with another stated uncertainty.
         #[must_use]
         pub fn claiming(self, stated: StatedUncertainty) -> Self {
             Self { stated, ..self }

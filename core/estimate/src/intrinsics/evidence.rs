@@ -1,16 +1,16 @@
-//! What the single views say of lens and bend: how sure an estimate is, and how far the bend that it leaves out would
+//! What the single views show of lens and bend: how certain an estimate is, and how far a bend that it leaves out would
 //! move it.
 //!
 //! At an optimum view `v` has, its own pose eliminated, the information `A_v` and the gradient `g_v` of the form, lens and
-//! bend. With `C = (Σ A_v)⁻¹` the form would still go by `b = −C Σ g_v`: nothing in what was estimated, and by what the
-//! corners say of a bend that was not. There the views pull the chosen unknowns `X` by
+//! bend. With `C = (Σ A_v)⁻¹` the form would still move by `b = −C Σ g_v`: zero in what was estimated, and in a bend that
+//! was not by what the corners show of it. There the views pull the chosen unknowns `X` by
 //!
 //! ```text
 //! z_v = (C (g_v + A_v b))_X,     E z_v z_vᵀ = σ² (C A_v C − C A_v C A_v C)_XX
 //! ```
 //!
-//! if all corners err independently. Those of one view do not: what warps an image or smears a print moves neighbours
-//! alike. Nothing is assumed of that but that the views are independent, and the covariance `σ² C_XX` is multiplied by the
+//! if the errors of all corners are independent. Those of one view are not: what warps an image or smears a print moves
+//! neighbours equally. Only the views are assumed independent, and the covariance `σ² C_XX` is multiplied by the
 //! `Σ z_vᵀ C_XX⁻¹ z_v` that is seen over the one expected.
 //!
 //! # Reference
@@ -27,27 +27,27 @@ use super::IntrinsicsError;
 use super::adjust::{Estimate, Problem, seen};
 use super::information::inverse;
 use crate::bend::Deflection;
-use crate::handeye::joint::view_block::split;
+use crate::handeye::joint::pose_part::split;
 use handeye_geometry::planar_pose::PoseError;
 use handeye_geometry::statistics::median;
 use handeye_geometry::view_equations::{FreeParameters, PoseEquations};
 
 /// Deflection of a board before any corner is seen, one standard deviation, as a part of its longer side: the most bent one
-/// that we met, on purpose, has a 42nd. It says nothing where corners say anything, and keeps finite what a bend that nobody
-/// looked at from the side could do.
+/// that we met, on purpose, has a 42nd. It has no effect where corners have any information, and keeps the effect of a bend
+/// that no oblique view shows finite.
 const USUAL_BEND: f64 = 0.02;
 /// Share of the errors that an interval is to hold.
 const HELD: f64 = 0.95;
 /// Half the width of that interval of a Gaussian, in standard deviations.
 const GAUSSIAN: f64 = 1.959_963_985;
 
-/// One view's part of the equations of the form.
+/// The part of one view in the equations of the form.
 pub(crate) struct Score {
     pub information: DMatrix<f64>,
     pub gradient: DVector<f64>,
 }
 
-/// By how much more the views scatter than corners that err independently would make them.
+/// Overdispersion of the views: how much more they scatter than with independent corner errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Scatter {
     /// Variance shown over variance expected.
@@ -59,7 +59,7 @@ pub(crate) struct Scatter {
 /// All views at one estimate.
 pub(super) struct Evidence {
     scores: Vec<Score>,
-    /// What the views say of the form, for residuals of standard deviation 1.
+    /// Information of the views on the form, for residuals of standard deviation 1.
     pub information: DMatrix<f64>,
     /// `Σ ‖W r‖²`
     pub cost: f64,
@@ -67,7 +67,7 @@ pub(super) struct Evidence {
     covariance: DMatrix<f64>,
     /// `b`
     step: DVector<f64>,
-    /// `σ²`; not a number where there are no more residuals than unknowns.
+    /// `σ²`; NaN where there are no more residuals than unknowns.
     variance: f64,
 }
 
@@ -75,15 +75,15 @@ pub(super) struct Evidence {
 pub(super) struct Spread {
     /// Their covariance.
     pub covariance: DMatrix<f64>,
-    /// By how much the errors that corners of a view share made it larger than independent ones would.
+    /// Factor by which the errors that corners of a view share made it larger than independent ones.
     pub ratio: f64,
     /// Degrees of freedom of that ratio.
     pub degrees_of_freedom: f64,
 }
 
 impl Evidence {
-    /// Linearises all views with these columns of the form. A bend among them that the estimate leaves out is taken to be a
-    /// usual one.
+    /// Linearises all views with these columns of the form. A bend among them that the estimate leaves out gets the prior
+    /// of a usual one.
     pub fn new(problem: &Problem<'_>, estimate: &Estimate, columns: FreeParameters) -> Result<Self, IntrinsicsError> {
         let n = columns.count(&estimate.intrinsics);
         let mut scores = Vec::with_capacity(problem.views.len());
@@ -101,7 +101,7 @@ impl Evidence {
             scores.push(score);
         }
         let corners: usize = problem.views.iter().map(|view| view.corners.len()).sum();
-        // Four corners a view can leave no more equations than unknowns; then nothing is known of the noise.
+        // Four corners a view can leave no more equations than unknowns; then the noise is unknown.
         let freedom = (2 * corners).saturating_sub(n + 6 * problem.views.len());
         let over_freedom = |cost: f64| if freedom > 0 { cost.max(0.0) / freedom as f64 } else { f64::NAN };
         let mut known = information.clone();
@@ -135,7 +135,7 @@ impl Evidence {
         Spread { covariance: stated * (self.variance * ratio), ratio, degrees_of_freedom }
     }
 
-    /// Where the target would be bent to from the estimate's shape, and how well that is known.
+    /// The bend that the target would get from the estimate's shape, and how well that is known.
     pub fn deflection(&self, problem: &Problem<'_>, estimate: &Estimate) -> Deflection {
         let warp_at = estimate.intrinsics.parameter_count();
         let spread = self.spread(warp_at, 2);
@@ -149,7 +149,7 @@ impl Evidence {
         }
     }
 
-    /// How far the form would still go in column `i`: by a bend that was left out.
+    /// How far a bend that was left out would move the form in column `i`.
     pub fn left_out(&self, i: usize) -> f64 {
         self.step[i]
     }
@@ -194,13 +194,13 @@ impl Spread {
         self.times() * self.covariance[(i, i)].sqrt()
     }
 
-    /// The same of a sum of the unknowns, each so many times.
+    /// The same for a sum of the unknowns, each with its factor in `times`.
     pub fn sigma_along(&self, times: &[f64]) -> f64 {
         let along = DVector::from_column_slice(times);
         self.times() * along.dot(&(&self.covariance * &along)).max(0.0).sqrt()
     }
 
-    /// Half the width of an interval of so few degrees of freedom over that of a Gaussian.
+    /// Half the width of an interval with these few degrees of freedom over that of a Gaussian.
     fn times(&self) -> f64 {
         StudentsT::new(0.0, 1.0, self.degrees_of_freedom)
             .map_or(1.0, |student| student.inverse_cdf(0.5 + 0.5 * HELD) / GAUSSIAN)

@@ -8,47 +8,21 @@
 
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
+use super::found::OddSession;
 use super::{NamedSession, Refit};
 use crate::handeye::joint::normal::covariance_of;
 use crate::handeye::joint::shared_lens::{Fitted, LensEstimate, difference};
 
 /// Sets of sessions of one lens that are taken for sessions of several.
 const FALSE_ALARM: f64 = 1e-3;
-/// Part of the focal length from which a difference is that of another focus, zoom or camera: that from which intrinsics
-/// that were given count as wrong, too.
-const ANOTHER: f64 = 3e-3;
-/// Degrees of freedom that are as good as infinitely many.
+/// Degrees of freedom that are practically infinite.
 const MANY: f64 = 1e6;
 
-/// A session whose lens differs from that of the others by more than chance explains.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OddSession {
-    /// Name of the session.
-    pub name: String,
-    /// Its focal length fx by itself, pixels.
-    pub focal_px: f64,
-    /// That of the others, pixels.
-    pub others_focal_px: f64,
-    /// Standard deviation of the difference, pixels.
-    pub sigma_px: f64,
-    /// Distance of its principal point from that of the others, pixels.
-    pub centre_apart_px: f64,
-}
-
-impl OddSession {
-    /// Whether it is another lens, and not the same one that the model does not follow: that shifts focal length and
-    /// principal point by parts in a thousand of the focal length, by other parts where the views cover others of the image.
-    pub fn is_another_lens(&self) -> bool {
-        let apart = (self.focal_px - self.others_focal_px).abs().max(self.centre_apart_px);
-        apart > ANOTHER * self.others_focal_px
-    }
-}
-
-/// What the lenses of all sessions, each alone, say of each other.
+/// How the lenses of all sessions, each alone, agree with each other.
 pub(super) struct Agreement {
     /// Probability of a difference as large as the largest if the lens is one.
     pub p_value: f64,
-    /// In the order of the sessions; empty where the lens is one.
+    /// Sessions with another lens, in their order; empty where the lens is one.
     pub odd: Vec<OddSession>,
 }
 
@@ -71,7 +45,7 @@ pub(super) fn test(sessions: &[NamedSession<'_>], alone: &[Fitted<Refit>]) -> Op
             differ.push(differs(sessions, alone, session, &rest)?);
         }
         differ.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));
-        // Of two, either differs from the other as much: one comparison, and nobody knows which of them it is.
+        // Of two, either differs from the other as much: one comparison, and it is not known which of them it is.
         let (comparisons, out) = if rest.len() > 2 { (rest.len(), 1) } else { (1, 2) };
         let worst = (differ[0].p_value * comparisons as f64).min(1.0);
         p_value.get_or_insert(worst);
@@ -86,7 +60,7 @@ pub(super) fn test(sessions: &[NamedSession<'_>], alone: &[Fitted<Refit>]) -> Op
     Some(Agreement { p_value: p_value.unwrap_or(1.0), odd: odd.into_iter().map(|it| it.odd).collect() })
 }
 
-/// How a session differs from those of `rest` besides it.
+/// How a session differs from the others in `rest`.
 fn differs(sessions: &[NamedSession<'_>], alone: &[Fitted<Refit>], session: usize, rest: &[usize]) -> Option<Differs> {
     let own = LensEstimate::by([&alone[session].says])?;
     let others = LensEstimate::by(rest.iter().filter(|other| **other != session).map(|other| &alone[*other].says))?;

@@ -1,22 +1,22 @@
 //! Several sessions of one camera, calibrated together with one lens.
 //!
 //! # What it estimates
-//! The lens that all sessions share, and for each what [`fit`](super::fit) estimates besides: both links, the
+//! The lens that all sessions share, and for each what [`fit`](super::fit) estimates in addition: both links, the
 //! corrections of its robot poses, its noise levels, and where its data show them a bent target and the robot's field. The
-//! result is the optimum of all sessions together, found in rounds over the sessions
-//! (`handeye/joint/shared_lens.rs`).
+//! result is the optimum of all sessions together, found in rounds over the sessions (`handeye/joint/shared_lens.rs`).
 //!
-//! A session counts for as much less as its own data refute its covariance ([`overdispersion`]).
+//! A session counts for less in proportion to its own [`overdispersion`].
 //!
 //! # Needs
-//! Two sessions or more, each enough for a calibration by itself with an estimated lens, of one image size and lens model.
-//! Mode and target may differ. Nobody touched focus, zoom or the resolution of the camera between them: [`agreement`] tests
-//! that.
+//! Two sessions or more, each enough for a calibration of its own with an estimated lens, of one image size and lens model.
+//! Mode and target may differ. Focus, zoom and resolution of the camera must be the same in all of them: [`agreement`]
+//! tests that.
 //!
 //! Source: `docs/maths/shared_intrinsics.md`.
 
 mod agreement;
 mod distortion;
+pub(crate) mod found;
 
 use nalgebra::DVector;
 
@@ -32,35 +32,13 @@ use crate::stated_uncertainty::Alternative;
 use handeye_geometry::progress::Work;
 use handeye_geometry::se3;
 
-pub use agreement::OddSession;
+pub use found::{OddSession, SharedLens};
 
 use distortion::Together;
 
 /// Rounds in which outliers, the shape of the target, the robot's field and the widening are decided again: in the first the
 /// lens is near its end, and the second decides with it.
 const DECIDING: usize = 2;
-
-/// What a calibration knows of the sessions that it shares its lens with.
-#[derive(Debug, Clone)]
-pub struct SharedLens {
-    /// How many sessions there are, its own among them.
-    pub sessions: usize,
-    /// Views in the fits of all of them.
-    pub views: usize,
-    /// Probability that sessions of one lens differ as much as these; of the worst, for the number of sessions.
-    pub p_value: f64,
-    /// Sessions whose lens differs by more than chance explains; empty where all agree.
-    pub odd: Vec<OddSession>,
-    /// The hand-eye transform with the lens of its own session alone.
-    pub with_own_lens: Alternative,
-}
-
-impl SharedLens {
-    /// Whether there is more than one lens, see [`OddSession::is_another_lens`].
-    pub(crate) fn has_others(&self) -> bool {
-        self.odd.iter().any(OddSession::is_another_lens)
-    }
-}
 
 /// Why sessions are not calibrated together.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -69,7 +47,7 @@ pub enum SharedLensError {
     /// There is nothing to share.
     #[error("{sessions} session: a lens is shared by two or more; calibrate one by itself")]
     TooFewSessions {
-        /// How many.
+        /// Number of sessions.
         sessions: usize,
     },
     /// The camera of a session is known.
@@ -133,7 +111,7 @@ pub enum SharedLensError {
         /// Why.
         error: CalibrateError,
     },
-    /// The sessions together have no lens.
+    /// The sessions together do not converge to one lens.
     #[error(
         "the sessions together do not come to one lens: calibrate them one by one, compare their lenses, and leave out those \
          whose lens is another one or hardly known"
@@ -147,7 +125,7 @@ impl SharedLensError {
         matches!(self, Self::Session { error: CalibrateError::HandEye(HandEyeError::Cancelled), .. })
     }
 
-    /// Whether the sessions as they are described do not go together, whatever the views show.
+    /// Whether the sessions by their descriptions do not go together, independent of the views.
     pub fn is_usage(&self) -> bool {
         !matches!(self, Self::Session { .. } | Self::NoLens)
     }
@@ -236,7 +214,7 @@ pub fn calibrate_sharing_lens<'a>(
 #[derive(Clone)]
 struct Refit {
     refined: Refined,
-    /// What its variances have to be multiplied by, see [`widening`].
+    /// Factor by which its variances have to be multiplied, see [`widening`].
     factor: f64,
 }
 
@@ -246,7 +224,7 @@ impl NamedSession<'_> {
     }
 }
 
-/// An estimate with what it says of the lens; `factor` is the widening where it is known.
+/// An estimate with its information on the lens; `factor` is the widening where it is known.
 fn fitted(
     session: &Session<'_>,
     refined: Refined,
@@ -264,7 +242,7 @@ fn fitted(
         // By chance the ratio is above one in half of all sessions, and a session does not weigh less for that.
         widening.factor * if widening.lens_is_refuted() { widening.lens } else { 1.0 }
     };
-    // What the lens does beyond its model makes it less known than the curvature of the cost says.
+    // A residual distortion makes the lens more uncertain than the curvature of the cost shows.
     let stated = refined.distortion.as_ref().and_then(|_| LensInformation::stated(solution));
     let says = if let Some(stated) = stated {
         stated

@@ -1,8 +1,8 @@
 //! A calibration against captures that were never in its fit.
 //!
-//! The bare chain — reported robot pose and calibration, nothing fitted — predicts where the board is; the corners say
-//! where it was seen. Both are of the board and the joints as the calibration found them. What lies between is the error
-//! that a user of the calibration gets: of the calibration, of the robot and of the image together. It is an error of
+//! The bare chain — reported robot pose and calibration, nothing fitted — predicts where the board is; the corners show
+//! where it was seen. Both use the board and the joints as the calibration found them. The difference is the error that
+//! a user of the calibration gets: that of the calibration, of the robot and of the image together. It is an error of
 //! prediction, measured on the board; it is not the residual of any fit.
 
 mod calibrated;
@@ -24,10 +24,11 @@ use handeye_geometry::targets::depth_plane::DepthPlane;
 use handeye_geometry::targets::observation::{Corner, View};
 use handeye_geometry::view_equations::{DepthBias, PredictedDepths};
 
+pub use crate::corrected_arm::TipAt;
 pub use calibrated::{Predictor, Uncertainty};
 pub use consistency::Consistency;
 pub use depth_camera::{DepthCheck, DepthErrors, DepthReport, Estimated};
-pub use points::{MeasuredPoint, TipAt};
+pub use points::MeasuredPoint;
 
 /// Why there is nothing to verify with.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
@@ -74,7 +75,7 @@ pub enum VerifyError {
     /// A pixel without ray.
     #[error(transparent)]
     Camera(#[from] CameraError),
-    /// A depth that is none.
+    /// A value that is not a valid depth.
     #[error("{depth_m} m is not a valid depth: choose a pixel with a measurement")]
     BadDepth {
         /// The depth given, metres.
@@ -95,20 +96,20 @@ pub enum VerifyError {
     Cancelled,
 }
 
-/// What one capture says.
+/// Result for one capture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CaptureCheck {
     /// Name of the capture.
     pub name: String,
     /// RMS of the 2-D distances between measured corners and those that the bare chain predicts, pixels.
     pub rms_px: f64,
-    /// The same with the board's pose fitted to this one image: what of it is corners and lens, pixels.
+    /// The same with the board's pose fitted to this one image: the part due to corners and lens, pixels.
     pub pnp_rms_px: f64,
     /// Every corner against its prediction.
     pub residuals: Vec<CornerResidual>,
     /// The board as predicted.
     pub predicted_camera_from_target: Pose<Camera, Target>,
-    /// The board as seen: its pose from the corners, and from the depths where the calibration counts on them, of the shape that
+    /// The board as seen: its pose from the corners, and from the depths where the calibration uses them, with the shape that
     /// the calibration found.
     pub seen_camera_from_target: Pose<Camera, Target>,
     /// Middle of the board as seen minus as predicted, in camera axes, metres.
@@ -125,7 +126,7 @@ pub struct CaptureCheck {
     pub ratio: Option<f64>,
 }
 
-/// What all captures say together.
+/// Result of all captures together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verification {
     /// One entry per capture, in the order given.
@@ -137,9 +138,9 @@ pub struct Verification {
     /// RMS of the angle between the board as seen and as predicted, radians.
     pub orientation_rms_rad: f64,
     /// Scatter of the board's origin over the captures, each located by robot, calibration and its own image: RMS
-    /// distance from the mean, metres. In the frame in which the board stands still: the base, or the tip when the
-    /// camera does. A board that was moved after the calibration leaves it small while every prediction is wrong by the
-    /// same amount. `None` for one capture.
+    /// distance from the mean, metres. In the frame in which the board is at rest: the base, or the tip when the camera
+    /// does. A board that was moved after the calibration leaves it small while every prediction is wrong by the same
+    /// amount. `None` for one capture.
     pub origin_scatter_m: Option<f64>,
     /// Whether the errors are of the size that the calibration states.
     pub consistency: Option<Consistency>,
@@ -152,11 +153,11 @@ impl Verification {
     }
 }
 
-/// Checks a calibration with captures, robot pose and sight of the board, that were never in its fit. `work` is a `&CancelToken`, or a [`Work`] to follow the
-/// progress.
+/// Checks a calibration with captures, robot pose and sight of the board, that were never in its fit. `work` is a `&CancelToken`,
+/// or a [`Work`] to follow the progress.
 ///
 /// # Needs
-/// One capture with the board; ten say something about the average. The board stands where it stood for the calibration.
+/// One capture with the board; ten give a useful average. The board has to be where it was for the calibration.
 ///
 /// # Errors
 /// [`VerifyError`]; the first in the order of the captures.
@@ -230,7 +231,7 @@ fn check(
     })
 }
 
-/// Of the predicted board.
+/// Depth error against the predicted board.
 fn depth_error_m(calibrated: &Predictor, plane: &DepthPlane, predicted: &Pose<Camera, Target>) -> f64 {
     let (lens, shape) = (&calibrated.intrinsics, &calibrated.shape);
     let expected = PredictedDepths::new(lens, shape, plane, &DepthBias::default(), predicted.isometry());

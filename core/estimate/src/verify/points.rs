@@ -1,22 +1,23 @@
 //! A pixel as a point in the base.
 
-use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix3xX, Matrix6xX, Point3, Vector2, Vector3};
+use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix3xX, Point3, Vector2, Vector3};
 
 use super::{Predictor, VerifyError};
+use crate::corrected_arm::TipAt;
 use crate::handeye::HandEye;
 use crate::handeye::joint::SmallSample;
 use handeye_geometry::camera::Intrinsics;
-use handeye_geometry::frames::{Base, Camera, PointIn, Pose, Target, Tip};
+use handeye_geometry::frames::{Base, Camera, PointIn, Pose, Target};
 use handeye_geometry::point_error;
 
 /// A point that the camera measured.
 #[derive(Debug, Clone, Copy)]
 pub struct MeasuredPoint {
-    /// Where it is in the camera, metres.
+    /// Its place in the camera, metres.
     pub in_camera: PointIn<Camera>,
-    /// Where it is in the base of the robot, metres.
+    /// Its place in the base of the robot, metres.
     pub in_base: PointIn<Base>,
-    /// Covariance in base axes, square metres, as far as the hand-eye transform causes it, and the errors of the arm where the tip is
+    /// Covariance in base axes, square metres, due to the hand-eye transform, and to the errors of the arm where the tip is
     /// corrected for them: the noise of this robot pose, of the depth or the corners, and of the lens come on top. `None` when the
     /// calibration states none.
     pub covariance_in_base: Option<Matrix3<f64>>,
@@ -30,25 +31,10 @@ impl MeasuredPoint {
         self.covariance_in_base.map(|c| c.diagonal().map(|v| v.max(0.0).sqrt()))
     }
 
-    /// The length that its error stays under with a probability of 95 %, metres; of the same part of the error, and by
-    /// the same law as the expected error of the calibration.
+    /// The length that its error stays below with a probability of 95 %, metres; for the same part of the error, and by
+    /// the same distribution as the expected error of the calibration.
     pub fn error_95_m(&self) -> Option<f64> {
         self.covariance_in_base.as_ref().map(|covariance| self.small_sample.radius_95(covariance))
-    }
-}
-
-/// Where the tip is.
-#[derive(Debug, Clone)]
-pub struct TipAt {
-    /// As reported, or corrected for the errors of the arm.
-    pub base_from_tip: Pose<Base, Tip>,
-    /// The twists `[t; r]` on its right by which it turns with these errors; no columns where it is not corrected.
-    pub by_errors: Matrix6xX<f64>,
-}
-
-impl From<&Pose<Base, Tip>> for TipAt {
-    fn from(reported: &Pose<Base, Tip>) -> Self {
-        Self { base_from_tip: *reported, by_errors: Matrix6xX::zeros(0) }
     }
 }
 
@@ -56,7 +42,7 @@ impl Predictor {
     /// The point at `depth_m` along the optical axis on the ray of a pixel.
     ///
     /// # Errors
-    /// [`VerifyError::BadDepth`] for what is no positive number or a ray that does not point forward,
+    /// [`VerifyError::BadDepth`] for a value that is not positive or a ray that does not point forward,
     /// [`VerifyError::Camera`] for a pixel outside the lens model.
     pub fn point_at_depth(
         &self,
@@ -122,7 +108,7 @@ pub(super) fn on_plane(
     let ray = intrinsics.unproject(px)?.into_inner();
     let normal = camera_from_target.rotation * Vector3::z();
     let along = normal.dot(&camera_from_target.translation.vector) / normal.dot(&ray);
-    // A ray along the plane gives infinity or not a number, one that meets it behind the camera a negative number.
+    // A ray along the plane gives infinity or NaN, one that meets it behind the camera a negative number.
     if along > 0.0 && along.is_finite() {
         Ok(Point3::from(ray * along))
     } else {

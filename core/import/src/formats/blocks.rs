@@ -1,19 +1,19 @@
-//! Texts in which names stand before numbers, as people have Python print them: `Rotation:` above a matrix, `tvec 1 2 3`,
-//! `R = [[…]]`, once or again and again with a count or the name of an image before them. They are read as fields by those names.
+//! Texts in which names precede numbers, as printed by Python scripts: `Rotation:` above a matrix, `tvec 1 2 3`, `R = [[…]]`,
+//! once or repeatedly, with a count or the name of an image before them. They are read as fields by those names.
 
 use std::collections::HashSet;
 
-use super::single::is_call;
+use super::names::is_call;
 use super::tree::{self, is_image_name};
 use super::{File, Format};
-use crate::reader::Reader;
+use crate::formats::reader::Reader;
 use crate::value::{Value, number};
 use handeye_wording::Text;
 use handeye_wording::text;
 
 /// Most numbers and names of one text.
 const MOST: usize = 1_000_000;
-/// Numbers behind a name that are kept: more of them are no pose and no joint values.
+/// Most numbers after a name: more are neither a pose nor joint values.
 const MOST_OF_A_FIELD: usize = 64;
 /// Words that a name may have.
 const MOST_WORDS: usize = 8;
@@ -36,7 +36,7 @@ impl Format for Blocks {
     }
 }
 
-/// The fields of a text, or of every record that begins where a name stands again; `None` where no numbers have names.
+/// The fields of a text, or of every record that begins where a name is repeated; `None` where no numbers have names.
 pub(super) fn document(text: &str) -> Option<Value> {
     let mut reader = Records::default();
     let is_between = |c: char| c.is_whitespace() || matches!(c, ',' | ';' | '[' | ']' | '(' | ')' | '{' | '}' | '|');
@@ -67,12 +67,12 @@ struct Records {
     /// Fields of the record that is being read, and their names.
     fields: Vec<(String, Value)>,
     known: HashSet<String>,
-    /// The words of the name that is being read, and the numbers that stand behind it.
+    /// The words of the name that is being read, and the numbers that follow it.
     name: Vec<String>,
     numbers: Vec<f64>,
     /// No word of the line was read.
     is_new_line: bool,
-    /// Its line has brackets, in which numbers are.
+    /// Its line has brackets around numbers.
     has_brackets: bool,
     /// What the name would count by if the numbers that it names were below it: a whole number alone.
     may_count: bool,
@@ -131,7 +131,7 @@ impl Records {
 
     fn named(&mut self, word: &str, is_first: bool) {
         self.end_of_field();
-        // A name is on one line, behind what it says of another matter on lines before.
+        // A name is on one line, after unrelated text on earlier lines.
         if is_first {
             self.name.clear();
         }

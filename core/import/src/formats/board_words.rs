@@ -1,8 +1,8 @@
-//! What settings of somebody's script say of a board. Names of such fields agree about nothing: whether inner corners or squares
-//! are counted, and in what lengths are, is left to a person, who is told what to give.
+//! A board in the settings of an unknown script. Such field names have no standard: whether inner corners or squares are
+//! counted, and the unit of lengths, is left to the user, who gets a message about what to give.
 
 use super::{File, Format};
-use crate::reader::Reader;
+use crate::formats::reader::Reader;
 use crate::value::Value;
 use handeye_wording::Text;
 use handeye_wording::text;
@@ -155,7 +155,7 @@ mod tests {
         let documents = yaml("board_squaresX: 5\nboard_squaresY: 7\nsquare_size_m: 0.0365\n").expect("YAML");
         let reported = stated(&documents[0], "board.yaml").expect("a board").to_string();
         assert!(reported.ends_with("--target 5x7x36.5"), "{reported}");
-        // Sizes of images and boards without a square are none.
+        // Sizes of images and boards without a square are not targets.
         assert_eq!(of_json(r#"{"board_image": [640, 480], "square_size": 25}"#), None);
         assert_eq!(of_json(r#"{"chessboard_size": [9, 6]}"#), None);
     }

@@ -3,7 +3,7 @@
 use super::intrinsics::{brown, camera, of_document, size_of};
 use super::{Content, Encoding, File, Format, text_camera};
 use crate::folder;
-use crate::reader::Reader;
+use crate::formats::reader::Reader;
 use crate::recording::FoundCamera;
 use crate::value;
 use handeye_geometry::camera::Distortion;
@@ -46,7 +46,7 @@ impl Format for Cameras {
     }
 }
 
-/// mrcal's `.cameramodel`: a Python dictionary, which is YAML but for the comments and trailing commas.
+/// mrcal's `.cameramodel`: a Python dictionary, which is YAML except for the comments and trailing commas.
 pub(super) fn mrcal(text: &str, file: &str) -> Option<FoundCamera> {
     let value = value::yaml(text).ok()?.into_iter().next()?;
     let model = value.get("lensmodel")?.text()?.to_owned();
@@ -60,8 +60,8 @@ pub(super) fn mrcal(text: &str, file: &str) -> Option<FoundCamera> {
     camera(file, "a camera model of mrcal", *four, size_of(&value), distortion)
 }
 
-/// The text of `ost.yaml` in the TAR that ROS' camera calibrator writes; `None` when there is none. Only files that lie in it
-/// uncompressed are read.
+/// The text of `ost.yaml` in the TAR that ROS' camera calibrator writes; `None` when there is none. Only uncompressed files
+/// in it are read.
 fn ost_in_tar(bytes: &[u8]) -> Option<String> {
     const BLOCK: usize = 512;
     let mut at = 0;

@@ -1,5 +1,5 @@
-//! Corners that another program has found, in JSON or YAML: lists of points of the image, to a file or to an element of a list, with
-//! what stands beside them of the size of the image and of the board.
+//! Corners that another program has found, in JSON or YAML: lists of image points, one per file or per element of a list, with the
+//! size of the image and of the board where the file has them.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use super::tree::{LEAST_POSES, is_image_name, track_name};
 use super::{File, Format};
 use crate::folder;
-use crate::reader::Reader;
+use crate::formats::reader::Reader;
 use crate::recording::{FoundTarget, ImageFile, Stream};
 use crate::value::Value;
 use handeye_geometry::targets::observation::Corner;
@@ -22,7 +22,7 @@ const MOST_POINTS: usize = 100_000;
 const DEEPEST: usize = 8;
 /// Elements of a list that is not of points and is looked into.
 const MOST_LOOKED_INTO: usize = 4;
-/// Lists of points of one file that are looked at, such as those before and after a refinement.
+/// Most lists of points of one file, such as those before and after a refinement.
 const MOST_LISTS: usize = 8;
 
 type Point = [f64; 2];
@@ -38,7 +38,7 @@ impl Format for Corners {
         file.value().is_some()
     }
 
-    /// They are no poses, which other formats may find in the same files.
+    /// They are not poses, which other formats may find in the same files.
     fn read_together(&self, files: &[File], reader: &mut Reader<'_>) -> bool {
         let (streams, targets) = streams(files);
         reader.recording.streams.extend(streams);
@@ -47,7 +47,7 @@ impl Format for Corners {
     }
 }
 
-/// What one image has of each list of points, by where it stands.
+/// The lists of points of one image, by their path in the document.
 struct View<'a> {
     file: PathBuf,
     number: Option<u64>,
@@ -103,7 +103,7 @@ fn elements<'a>(value: &'a Value, path: &str, depth: usize) -> Option<(String, V
         _ => return None,
     };
     let with_points = views.iter().filter(|view| !view.lists.is_empty()).count();
-    // Lists of one image, such as points before and after a refinement, are no images.
+    // Lists of one image, such as points before and after a refinement, are not separate images.
     let are_images = with_points >= LEAST_POSES && 2 * with_points >= views.len();
     if are_images {
         return Some((path.to_owned(), views));
@@ -171,7 +171,7 @@ fn of_views(name: &str, views: &[View<'_>], whole: Option<&Value>) -> (Vec<Strea
     (streams, targets)
 }
 
-/// Every list of points of an image in a value, with where it stands.
+/// Every list of points of an image in a value, with its path.
 fn look(value: &Value, path: &str, lists: &mut Vec<(String, Vec<Point>)>, depth: usize) {
     if depth > DEEPEST || lists.len() >= MOST_LISTS {
         return;
@@ -201,7 +201,7 @@ fn look(value: &Value, path: &str, lists: &mut Vec<(String, Vec<Point>)>, depth:
     }
 }
 
-/// The points that a value is: a list of pairs, however they are nested or called, or their coordinates one after the other or in two
+/// The points of a value: a list of pairs, however they are nested or called, or their coordinates one after the other or in two
 /// lists.
 fn points(value: &Value, path: &str) -> Option<Vec<Point>> {
     let list = match value {
@@ -219,7 +219,7 @@ fn points(value: &Value, path: &str) -> Option<Vec<Point>> {
             if are_pairs.is_some() {
                 points
             } else {
-                // Numbers one after the other are points where their name says so.
+                // Consecutive numbers are points where their name says so.
                 let is_named = ["corner", "point", "pixel", "pts", "uv"].iter().any(|word| path.contains(word));
                 let numbers =
                     value.numbers(2 * MOST_POINTS).filter(|numbers| is_named && numbers.len().is_multiple_of(2))?;
@@ -255,7 +255,7 @@ fn pairs(value: &Value, points: &mut Vec<Point>, depth: usize) -> Option<()> {
     Some(())
 }
 
-/// The size of the image that a document says, in pixels.
+/// The size of the image that a document states, in pixels.
 fn size(value: &Value, depth: usize) -> Option<(u32, u32)> {
     let Value::Map(entries) = value else { return None };
     let whole = |keys: &[&str]| {
@@ -287,7 +287,7 @@ fn whole_size(width: f64, height: f64) -> Option<(u32, u32)> {
     Some((side(width)?, side(height)?))
 }
 
-/// A board that a document describes with the unit of its square in the name; one without a unit is told of and not taken.
+/// A board that a document describes with the unit of its square in the name; one without a unit is reported and not used.
 fn board(value: &Value, depth: usize) -> Option<Grid> {
     let Value::Map(entries) = value else { return None };
     let side = |number: f64| (number.fract() == 0.0 && (2.0..1000.0).contains(&number)).then_some(number as usize);
@@ -324,11 +324,11 @@ fn board(value: &Value, depth: usize) -> Option<Grid> {
     }
 }
 
-/// The recorded points of an image as corners of a target, which has as many. Points that go down the columns are told from those
-/// along the rows by which of both is a grid in perspective.
+/// The recorded points of an image as corners of a target, which has as many. Whether points go down the columns or along the
+/// rows is decided by which of the two is a grid in perspective.
 ///
 /// # Errors
-/// A sentence, where the target has another number of points, or is none of a grid.
+/// A sentence, where the target has another number of points, or is not a grid.
 pub(crate) fn numbered(points: &[Point], target: &TargetSpec) -> Result<Vec<Corner>, Text> {
     let grid = match target {
         TargetSpec::Chessboard(grid) | TargetSpec::Circles(grid) => *grid,
@@ -362,7 +362,7 @@ pub(crate) fn numbered(points: &[Point], target: &TargetSpec) -> Result<Vec<Corn
     Ok(if bent(&turned) < bent(&plain) { turned } else { plain })
 }
 
-/// How far neighbours are from the middle of those beside them, at the mean: little along the lines of a grid.
+/// Mean distance of corners from the middle of their two neighbours: little along the lines of a grid.
 fn bent_px(corners: &[Corner], columns: usize, rows: usize) -> f64 {
     let at = |column: usize, row: usize| corners[row * columns + column].px;
     let along = (0..rows).flat_map(|row| (1..columns - 1).map(move |c| ((c - 1, row), (c, row), (c + 1, row))));
@@ -372,7 +372,7 @@ fn bent_px(corners: &[Corner], columns: usize, rows: usize) -> f64 {
     triples.map(|(a, b, c)| ((at(a.0, a.1) + at(c.0, c.1)) / 2.0 - at(b.0, b.1)).norm()).sum()
 }
 
-/// Whether points lie in an image of this size, as far as a refinement may slide over its border.
+/// Whether points are in an image of this size, as far as a refinement may slide over its border.
 pub(crate) fn are_inside(points: &[Point], (width, height): (u32, u32)) -> bool {
     let is_in = |px: f64, side: u32| (-1.0..=f64::from(side)).contains(&px);
     points.iter().all(|[u, v]| is_in(*u, width) && is_in(*v, height))

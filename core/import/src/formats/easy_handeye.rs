@@ -1,13 +1,13 @@
-//! easy_handeye2: `.samples` beside `.calib`. With the camera beside the robot its samples hold the robot's pose the other
-//! way round (effector to base), and only the `.calib` says which of the two it is.
+//! easy_handeye2: `.samples` next to `.calib`. With the camera next to the robot (eye to hand) its samples hold the
+//! robot's pose the other way round (effector to base), and only the `.calib` states which of the two it is.
 
 use std::path::Path;
 
 use super::{Encoding, File, Format, tree};
 use crate::conventions::{Direction, LengthUnit, RotationForm};
 use crate::folder;
-use crate::nothing::Likely;
-use crate::reader::Reader;
+use crate::formats::nothing::Likely;
+use crate::formats::reader::Reader;
 use crate::recording::{FoundMode, Known, Role, Track};
 use crate::value::Value;
 use handeye_estimate::handeye::Mode;
@@ -36,7 +36,7 @@ impl Format for EasyHandeye {
     fn read(&self, file: &File, reader: &mut Reader<'_>) -> bool {
         let (Some(value), name) = (file.value(), file.name()) else { return false };
         if let Some(mode) = mode(value, &file.path) {
-            // Of several recordings beside each other each has its own.
+            // Each of several recordings in a folder has its own.
             let beside = reader.root.join(file.path.with_extension("samples"));
             if !is_calib(&file.path) || beside.is_file() {
                 reader.mode(mode);
@@ -60,7 +60,7 @@ fn is_calib(file: &Path) -> bool {
     folder::ending(file) == "calib"
 }
 
-/// The series of a file of samples; `None` when it is none.
+/// The series of a file of samples; `None` when it is not one.
 fn samples(value: &Value, file: &str) -> Option<Vec<Track>> {
     let first = value.get("samples")?.list().first()?;
     first.get("robot")?;
@@ -86,7 +86,7 @@ fn samples(value: &Value, file: &str) -> Option<Vec<Track>> {
     (tracks.len() >= 2).then_some(tracks)
 }
 
-/// Where the camera sits by a `.calib` of easy_handeye2, or a result of easy_handeye.
+/// Where the camera is mounted by a `.calib` of easy_handeye2, or a result of easy_handeye.
 fn mode(value: &Value, file: &Path) -> Option<FoundMode> {
     let parameters = value.get("parameters")?;
     let by = |key: &'static str, value: Mode| FoundMode { value, key, file: file.display().to_string() };

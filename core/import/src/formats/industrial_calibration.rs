@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::{File, Format, tree};
 use crate::conventions::{Direction, LengthUnit};
 use crate::folder;
-use crate::reader::Reader;
+use crate::formats::reader::Reader;
 use crate::recording::{FoundMode, FoundTarget, Known, Role, Sample, Track};
 use crate::value::{self, Value};
 use handeye_estimate::handeye::Mode;
@@ -50,7 +50,8 @@ impl Format for IndustrialCalibration {
     }
 }
 
-/// The series that a list of pairs names; `None` when the document is none. `read` gives the document in a file beside it.
+/// The series that a list of pairs names; `None` when the document is not one. `read` returns the document in a file next
+/// to it.
 fn pairs(value: &Value, file: &Path, read: impl Fn(&Path) -> Option<Value>) -> Option<Track> {
     let list = value.get("data").unwrap_or(value).list();
     let folder = file.parent().unwrap_or(Path::new(""));
@@ -87,7 +88,7 @@ fn pairs(value: &Value, file: &Path, read: impl Fn(&Path) -> Option<Value>) -> O
     Some(track)
 }
 
-/// Where the camera sits, where the file says it.
+/// Where the camera is mounted, if the file states it.
 fn mode(value: &Value, file: &Path) -> Option<FoundMode> {
     let key = "static_camera";
     let mode = if value.get(key)?.flag()? { Mode::EyeToHand } else { Mode::EyeInHand };

@@ -1,4 +1,4 @@
-//! The formats that are read, each in a file of its own and all of them in [`ALL`].
+//! The formats that are read, each in its own file and all of them in [`ALL`].
 
 mod blocks;
 mod board_words;
@@ -11,10 +11,12 @@ pub(super) mod joints;
 mod moveit;
 mod named;
 mod names;
+pub(super) mod nothing;
 mod npz;
 mod parts;
 mod pose_files;
 mod program;
+pub(super) mod reader;
 mod rosbag;
 mod single;
 mod table;
@@ -24,13 +26,13 @@ mod visp;
 
 use std::path::{Path, PathBuf};
 
-use crate::nothing::Likely;
-use crate::reader::Reader;
+use crate::formats::nothing::Likely;
+use crate::formats::reader::Reader;
 use crate::recording::Recording;
 use crate::value::Value;
 use handeye_wording::Text;
 
-/// All formats. A file is offered to them in this order: what says most of itself comes first.
+/// All formats. A file is offered to them in this order: the most specific ones come first.
 pub(crate) const ALL: [&dyn Format; 14] = [
     &corners::Corners,
     &visp::Visp,
@@ -50,30 +52,30 @@ pub(crate) const ALL: [&dyn Format; 14] = [
 
 /// A format of files with poses, joint values, corners, cameras or targets.
 pub(crate) trait Format: Sync {
-    /// As the window, the command line and the document list it.
+    /// Name for the window, the command line and the document.
     fn name(&self) -> Text;
 
-    /// How names of its files end where no other format has them, in lower case without the first dot.
+    /// Endings of its files where no other format has them, in lower case without the first dot.
     fn endings(&self) -> &'static [(&'static str, Encoding)] {
         &[]
     }
 
-    /// Whether it is one of poses or joint values: of a file whose poses were read, no other format reads them again.
+    /// Whether it has poses or joint values: once a file's poses were read, no other format reads them again.
     fn is_of_poses(&self) -> bool {
         true
     }
 
-    /// Whether a file of its endings is read beside one that was named, which may need it as a camera or a target.
+    /// Whether a file of its endings is read together with a named file, which may need it as a camera or a target.
     fn is_beside(&self, _file: &Path, _named: &Path) -> bool {
         !self.is_of_poses()
     }
 
-    /// Whether a file may be of it, by its ending or what it has.
+    /// Whether a file may be of this format, by its ending or its contents.
     fn sniff(&self, file: &File) -> bool {
         self.has_ending(file)
     }
 
-    /// Whether the name of a file ends as those of this format alone do.
+    /// Whether the name of a file has an ending of this format only.
     fn has_ending(&self, file: &File) -> bool {
         let own = of_ending(&file.path).is_some_and(|(format, _)| format.endings() == self.endings());
         own && !self.endings().is_empty()
@@ -89,7 +91,7 @@ pub(crate) trait Format: Sync {
         false
     }
 
-    /// Says what is known of series by what all files have.
+    /// Adds what all files together show about series.
     fn finish(&self, _recording: &mut Recording) {}
 
     /// What a file of its endings has where no series was found.
@@ -98,16 +100,16 @@ pub(crate) trait Format: Sync {
     }
 }
 
-/// How a file is read before it is known of which format it is.
+/// How a file is read before its format is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Encoding {
     Json,
     Yaml,
     Xml,
     Text,
-    /// By its format alone.
+    /// Read by its format only.
     Own,
-    /// By its format alone, which may have several files of a folder; after all others.
+    /// Read by its format only, which may have several files of a folder; after all others.
     Bag,
 }
 
@@ -123,7 +125,7 @@ pub(crate) struct File {
 
 #[derive(Debug, Clone)]
 pub(crate) enum Content {
-    /// Of JSON, YAML or XML, whatever the file is called.
+    /// A value from JSON, YAML or XML, whatever the ending of the file is.
     Document(Value),
     Text(String),
     /// Its format reads it.
@@ -156,7 +158,7 @@ pub(crate) fn of_ending(path: &Path) -> Option<(&'static dyn Format, Encoding)> 
     endings.into_iter().find(|(_, ending, _)| has(ending)).map(|(format, _, encoding)| (format, encoding))
 }
 
-/// What [`open`](crate::open) reads: names of formats, and how names of their files end where that tells them.
+/// The formats that [`open`](crate::open) reads: their names, and the endings of their files where these identify them.
 pub fn formats() -> Vec<(Text, String)> {
     let endings = |format: &dyn Format| {
         let named = format.endings().iter().filter(|(ending, _)| !ending.is_empty());
@@ -165,7 +167,7 @@ pub fn formats() -> Vec<(Text, String)> {
     ALL.iter().map(|format| (format.name(), endings(*format))).collect()
 }
 
-/// Formats with poses of which files are told by their endings.
+/// Formats with poses whose files are identified by their endings.
 pub(crate) fn with_poses() -> Text {
     let named = ALL.iter().filter(|format| format.is_of_poses() && !format.endings().is_empty());
     Text::list(named.map(|format| format.name()))

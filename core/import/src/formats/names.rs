@@ -1,25 +1,25 @@
-//! What the name of a field says: which part of a pose it is, of what, and in which unit.
+//! The meaning of a field's name: which part of a pose it is, of what, and in which unit.
 
 use crate::conventions::{AngleUnit, LengthUnit};
 
-/// Parts of a pose that stand in fields of their own.
+/// Parts of a pose that have fields of their own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Part {
     Translation,
     Rotation,
 }
 
-/// A name that says which part of a pose it is.
+/// A name that denotes a part of a pose.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Name {
     pub part: Part,
-    /// What is left of it: what the pose is of.
+    /// Rest of the name: what the pose belongs to.
     pub whose: String,
     pub length: Option<LengthUnit>,
     pub angle: Option<AngleUnit>,
 }
 
-/// What a name says; `None` where it is none of a translation nor of a rotation.
+/// The meaning of a name; `None` where it denotes neither a translation nor a rotation.
 pub(super) fn of(key: &str) -> Option<Name> {
     let words = words(key);
     let lower: Vec<String> = words.iter().map(|word| word.to_lowercase()).collect();
@@ -52,7 +52,7 @@ pub(super) fn of(key: &str) -> Option<Name> {
     Some(Name { part, whose: whose.join("_"), length, angle })
 }
 
-/// Whether a name is one of axis times angle.
+/// Whether a name denotes axis times angle.
 pub(super) fn is_rotation_vector(key: &str) -> bool {
     let words: Vec<String> = words(key).iter().map(|word| word.to_lowercase()).collect();
     let has = |names: &[&str]| words.iter().any(|word| names.contains(&word.as_str()));
@@ -112,6 +112,11 @@ fn angle_unit(word: &str) -> Option<AngleUnit> {
         "rad" | "radian" | "radians" => Some(AngleUnit::Radian),
         _ => None,
     }
+}
+
+/// The word that Python prints before the brackets of an array.
+pub(super) fn is_call(word: &str) -> bool {
+    matches!(word, "array" | "np.array" | "numpy.array" | "matrix" | "np.matrix" | "Matrix" | "tensor" | "torch.tensor")
 }
 
 #[cfg(test)]

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use super::parts::{self, Part};
 use super::{Encoding, File, Format, tree};
 use crate::folder;
-use crate::nothing::Likely;
-use crate::reader::Reader;
+use crate::formats::nothing::Likely;
+use crate::formats::reader::Reader;
 use crate::recording::{Sample, Stated, Track};
 use crate::value::Value;
 use handeye_files::budget::Budget;
@@ -101,7 +101,7 @@ fn arrays(file: &str, bytes: &[u8], budget: &Budget<'_>) -> Result<(Vec<Array>, 
             let entry = zip.by_index(i).map_err(|e| foreign(&e))?;
             let name = entry.name().trim_end_matches(".npy").to_owned();
             let mut content = Vec::new();
-            // What it unpacks to is not believed: no more is read than an array may have.
+            // The stated unpacked size is not trusted: no more is read than an array may have.
             let most = 16 * MOST_NUMBERS as u64;
             let unpacked = entry.take(most).read_to_end(&mut content).map_err(|e| foreign(&e))?;
             budget.unpack(unpacked as u64)?;
@@ -237,7 +237,7 @@ fn numbers(data: &[u8], count: usize, letter: &str, size: usize, is_big: bool) -
     data.chunks_exact(size).map(one).collect()
 }
 
-/// Texts of so many characters of four bytes, filled up with zeros.
+/// Texts of `size` characters of four bytes, filled up with zeros.
 fn texts(data: &[u8], count: usize, size: usize, is_big: bool) -> Option<Vec<String>> {
     let bytes = size.checked_mul(4)?;
     let data = data.get(..count.checked_mul(bytes)?)?;
@@ -254,7 +254,7 @@ fn texts(data: &[u8], count: usize, size: usize, is_big: bool) -> Option<Vec<Str
     Some(data.chunks_exact(bytes).map(text).collect())
 }
 
-/// Numbers that stand column by column, row by row.
+/// Numbers in column-major order, converted to row-major order.
 fn row_major(numbers: &[f64], shape: &[usize]) -> Vec<f64> {
     let mut out = Vec::with_capacity(numbers.len());
     let mut index = vec![0usize; shape.len()];

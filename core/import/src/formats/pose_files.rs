@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::{Content, File, Format, blocks, joints, npz, single, tree};
 use crate::folder;
-use crate::reader::Reader;
+use crate::formats::reader::Reader;
 use crate::recording::{Role, Sample, Stated, Track};
 use crate::value::Value;
 use handeye_wording::Text;
@@ -37,7 +37,7 @@ impl Format for PoseFiles {
 
 /// The series of documents that have a pose each, one for every place at which most of them have one.
 pub(super) fn tracks(files: &[File], reader: &Reader<'_>) -> Vec<Track> {
-    // Files that are each a series have first poses, which are none together.
+    // Where each file is a series, their first poses together are not one.
     let is_series = |value: &Value| tree::series(value, "").iter().any(|track| !track.is_still());
     let are_series = files.iter().filter_map(File::value).filter(|value| is_series(value)).count() * 2 > files.len();
     let mut by_path: Vec<(String, Stated, Vec<Sample>)> = Vec::new();
@@ -105,7 +105,7 @@ fn of_texts(files: &[File], reader: &mut Reader<'_>) -> bool {
         reader.recording.tracks.extend(tracks);
         return true;
     }
-    // Of several records a file is a series itself.
+    // A file with several records is a series itself.
     let document = |file: &File| {
         let value = blocks::document(file.text()?).filter(|value| matches!(value, Value::Map(_)))?;
         Some(File { content: Content::Document(value), ..file.clone() })
@@ -115,7 +115,7 @@ fn of_texts(files: &[File], reader: &mut Reader<'_>) -> bool {
 }
 
 fn of_arrays(files: &[File], reader: &mut Reader<'_>) -> bool {
-    // Files of many poses are large, and looked at by themselves.
+    // Files of many poses are large, and are read separately.
     const LARGEST: u64 = 1 << 16;
     let one = |file: &File| {
         let path = reader.root.join(&file.path);
@@ -142,7 +142,7 @@ fn shown(files: &[File]) -> String {
     folder::shown(files.iter().map(|file| file.path.as_path()))
 }
 
-/// What poses in files of this name are of: by the name, then by their folder, unless that is one of images.
+/// What poses in files of this name belong to: by the name, then by their folder, unless that is a folder of images.
 fn role_of(files: &str, reader: &Reader<'_>) -> Role {
     let path = Path::new(files);
     let of = |name: &OsStr| tree::role_of_files(&name.to_string_lossy());
@@ -154,7 +154,7 @@ fn role_of(files: &str, reader: &Reader<'_>) -> Role {
     path.parent().and_then(Path::file_name).map_or(Role::Unknown, of)
 }
 
-/// The name of an image with its folder, where it lies beside the file that names it.
+/// The name of an image with its folder, where it is next to the file that names it.
 fn beside(root: &Path, file: &Path, image: String) -> String {
     let path = file.with_file_name(&image);
     if root.join(&path).is_file() { path.display().to_string() } else { image }

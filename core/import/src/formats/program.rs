@@ -1,18 +1,18 @@
-//! Poses in programs of robots, whose languages say what their numbers mean: URScript's `p[…]`, frames of KUKA's KRL, positions
-//! of FANUC and robtargets of ABB's RAPID.
+//! Poses in robot programs, whose languages define the meaning of their numbers: URScript's `p[…]`, frames of KUKA's KRL,
+//! positions of FANUC and robtargets of ABB's RAPID.
 
 use std::sync::Arc;
 
 use super::Encoding::{self, Own};
 use super::{File, Format, tree};
 use crate::conventions::{AngleUnit, Euler, LengthUnit, RotationForm, is_unit};
-use crate::reader::Reader;
+use crate::formats::reader::Reader;
 use crate::recording::{Known, Numbers, Role, Sample, Stated, Track};
 use crate::value::number;
 use handeye_wording::Text;
 use handeye_wording::text;
 
-/// Poses of one file that are looked at.
+/// Most poses of one file.
 const MOST_POSES: usize = 100_000;
 
 pub(super) struct Programs;
@@ -39,7 +39,7 @@ impl Format for Programs {
     }
 }
 
-/// Languages, with what they say of their numbers.
+/// Languages, with the conventions of their numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Language {
     UrScript,
@@ -73,7 +73,7 @@ impl Language {
         }
     }
 
-    /// The pose that begins with a piece of a text, if one does; `before` is what stands on its line before it.
+    /// The pose that begins with a piece of a text, if one does; `before` is the text before it on its line.
     fn pose(self, before: &str, rest: &str) -> Option<Numbers> {
         match self {
             Self::UrScript => {
@@ -114,7 +114,7 @@ fn by_keys(rest: &str, keys: [&str; 6], is_so: impl Fn(&str) -> bool) -> Option<
     Some(Numbers::Angles(numbers))
 }
 
-/// The series of poses of a program; `None` when it is none.
+/// The series of poses of a program; `None` when it is not one.
 fn read(file: &str, text: &str) -> Option<Track> {
     Language::ALL.into_iter().find_map(|language| {
         let begins: &[char] = if language == Language::UrScript { &['p'] } else { &['{', '['] };
@@ -141,7 +141,7 @@ fn read(file: &str, text: &str) -> Option<Track> {
     })
 }
 
-/// What stands before and behind a place, no more than a pose with its line has: a long line is not read again and again.
+/// The text before and after a place, no more than a pose with its line has: a long line is not read again and again.
 fn around(text: &str, at: usize) -> (&str, &str) {
     const MOST: usize = 1000;
     let start = text.ceil_char_boundary(at.saturating_sub(MOST));

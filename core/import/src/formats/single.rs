@@ -1,19 +1,20 @@
-//! A pose to a file that has numbers and no names, so that nothing else tells what they are.
+//! One pose per file that has numbers and no names, so that their meaning is open.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
+use super::names::is_call;
 use super::table::bare::{self, Row};
 use crate::recording::{Role, Track};
 use crate::value::number;
 use handeye_wording::Text;
 
-/// No pose with joint values beside it has as many numbers.
+/// No pose with joint values has more numbers than this.
 pub(super) const MOST_NUMBERS: usize = 32;
 
-/// The series that files of one naming are, of which the numbers are known where they have nothing else, in every order of the numbers;
-/// none where most of them have other words or no common number of numbers.
+/// The series of files of one naming, where they contain only numbers, in every order of the numbers; none where most of them have
+/// other words or different numbers of values.
 pub(super) fn tracks<'a>(
     name: &str,
     role: Role,
@@ -40,22 +41,17 @@ pub(super) fn tracks<'a>(
     tracks
 }
 
-/// Where a pose stands that has a file for itself.
+/// The place of a pose that has its own file.
 pub(super) fn place(file: &Path) -> Text {
     let name = file.display().to_string();
     Text::verbatim(name)
 }
 
-/// The numbers of a text that has nothing else, whatever stands between them; brackets and calls of Python's are nothing.
+/// The numbers of a text that has nothing else, whatever separates them; brackets and Python calls are ignored.
 pub(super) fn numbers(text: &str) -> Option<Vec<f64>> {
     let is_sign = |c: char| c.is_whitespace() || matches!(c, ',' | ';' | '[' | ']' | '(' | ')');
     let words = text.split(is_sign).filter(|word| !word.is_empty() && !is_call(word));
     words.take(MOST_NUMBERS + 1).map(number).collect::<Option<Vec<f64>>>().filter(|n| n.len() <= MOST_NUMBERS)
-}
-
-/// What Python writes before the brackets of an array.
-pub(super) fn is_call(word: &str) -> bool {
-    matches!(word, "array" | "np.array" | "numpy.array" | "matrix" | "np.matrix" | "Matrix" | "tensor" | "torch.tensor")
 }
 
 #[cfg(test)]

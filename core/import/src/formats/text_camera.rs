@@ -1,14 +1,14 @@
-//! A camera in a text: its matrix and its distortion as somebody printed or saved them, with or without words, in one file or in two.
+//! A camera in a text: its matrix and its distortion as printed or saved by a script, with or without words, in one file or in two.
 
 use std::path::Path;
 
 use super::intrinsics;
-use super::single::is_call;
+use super::names::is_call;
 use crate::folder;
 use crate::recording::FoundCamera;
 use crate::value::{Value, number};
 
-/// Numbers of a text at the most: a camera has some twenty.
+/// Most numbers of a text: a camera has about twenty.
 const MOST_NUMBERS: usize = 200;
 
 /// Numbers, and the words before them.
@@ -32,7 +32,8 @@ impl Run {
     }
 }
 
-/// The camera of a text. Where it has a matrix and no distortion, that of a file beside is taken that is called so.
+/// The camera of a text. Where it has a matrix and no distortion, the distortion is read from a file next to it with
+/// that name.
 pub(super) fn read(text: &str, file: &Path, root: &Path) -> Option<FoundCamera> {
     let runs = runs(text)?;
     let (at, matrix) = matrix(&runs)?;
@@ -66,7 +67,7 @@ fn list(numbers: &[f64]) -> Value {
     Value::List(numbers.iter().map(|number| Value::Number(*number)).collect())
 }
 
-/// How many coefficients lenses have.
+/// Whether a lens model has this many coefficients.
 fn is_coefficients(count: usize) -> bool {
     matches!(count, 4 | 5 | 8 | 12 | 14)
 }
@@ -121,7 +122,7 @@ fn matrix(runs: &[Run]) -> Option<((usize, usize), Vec<f64>)> {
         found.extend(windows.map(|(first, k)| ((at, first + 9), k.to_vec())));
     }
     let first = found.first()?.clone();
-    // Of several cameras nothing says which it is.
+    // With several different cameras it is not known which one is meant.
     found.iter().all(|(_, k)| *k == first.1).then_some(first)
 }
 
@@ -134,7 +135,7 @@ fn distortion(runs: &[Run], (at, end): (usize, usize)) -> Option<Vec<f64>> {
     is_coefficients(numbers.len()).then_some(numbers)
 }
 
-/// The file beside that is called after the distortion.
+/// The file next to it that is named after the distortion.
 fn distortion_beside(file: &Path, root: &Path) -> Option<std::path::PathBuf> {
     let folder = file.parent().unwrap_or(Path::new(""));
     let mut names: Vec<_> =

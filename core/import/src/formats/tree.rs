@@ -1,5 +1,5 @@
-//! Poses in JSON, YAML and OpenCV's files, wherever they stand in the tree: arrays of 6, 7, 12 or 16 numbers, named fields,
-//! a rotation beside a translation; in a list, under keys that count, or one to a file.
+//! Poses in JSON, YAML and OpenCV's files, anywhere in the tree: arrays of 6, 7, 12 or 16 numbers, named fields, a rotation
+//! with a translation; in a list, under numbered keys, or one per file.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,8 +10,8 @@ use super::parts::{self, Part};
 use super::{File, Format, joints, named};
 use crate::conventions::{Euler, RotationForm, is_unit, rigid};
 use crate::folder;
-use crate::nothing::Likely;
-use crate::reader::Reader;
+use crate::formats::nothing::Likely;
+use crate::formats::reader::Reader;
 use crate::recording::{Known, Numbers, Role, Sample, Stated, Track};
 use crate::value::Value;
 use handeye_wording::Text;
@@ -19,7 +19,7 @@ use handeye_wording::text;
 
 /// Poses that make a series.
 pub(crate) const LEAST_POSES: usize = 3;
-/// Series of one file that are looked at.
+/// Most series of one file.
 const MOST_SERIES: usize = 32;
 /// Elements of a list that are not a series and are looked into.
 const MOST_LOOKED_INTO: usize = 8;
@@ -35,7 +35,7 @@ impl Format for Documents {
         &[("json", Json), ("jsonl", Json), ("yaml", Yaml), ("yml", Yaml), ("xml", Xml)]
     }
 
-    /// A camera in JSON lies beside poses more rarely than other poses do.
+    /// A JSON file next to poses is more often other poses than a camera.
     fn is_beside(&self, file: &Path, _named: &Path) -> bool {
         !folder::ending(file).starts_with("json")
     }
@@ -65,7 +65,7 @@ pub(super) fn instead(value: &Value) -> (Likely, Text) {
     }
 }
 
-/// What one element of a series, or one file, has.
+/// Contents of one element of a series, or of one file.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Fields {
     pub poses: Vec<(String, Numbers, Stated)>,
@@ -75,7 +75,7 @@ pub(crate) struct Fields {
 }
 
 impl Fields {
-    /// A pose that may stand in several ways has one of them.
+    /// A pose with several representations is added once.
     fn add(&mut self, path: String, numbers: Numbers, stated: Stated) {
         if self.poses.iter().all(|(known, ..)| *known != path) {
             self.poses.push((path, numbers, stated));
@@ -83,7 +83,7 @@ impl Fields {
     }
 }
 
-/// Everything in a value that may be a pose, with where it stands.
+/// Everything in a value that may be a pose, with its path.
 pub(crate) fn fields(value: &Value) -> Fields {
     let mut fields = Fields::default();
     walk(value, "", &mut fields, 0);
@@ -136,7 +136,7 @@ fn walk_map(entries: &[(String, Value)], value: &Value, path: &str, fields: &mut
                 fields.image = Some(text.trim().to_owned());
             }
             Value::Number(_) if fields.number.is_none() && is_counting(key) => fields.number = inner.whole(),
-            // Parts of a pose that was found are no poses of their own.
+            // Parts of a pose that was found are not separate poses.
             Value::Map(_) | Value::List(_) => walk(inner, &joined(path, key), fields, depth + 1),
             _ => {}
         }
@@ -166,7 +166,7 @@ fn folded(entries: &[Entry]) -> (Vec<Entry>, Vec<&Entry>) {
     let is_folded = |key: &str| counting_key(key).is_some_and(|(prefix, _)| by_prefix.contains_key(&prefix));
     let rest = entries.iter().filter(|(key, inner)| inner.number().is_none() || !is_folded(key)).collect();
     let list = |(prefix, members): (&String, &Vec<(u64, f64)>)| {
-        // What is called so is an axis of the arm.
+        // A field of this name is an axis of the arm.
         let name = if matches!(&*prefix.to_lowercase(), "j" | "a" | "axis") { "joint" } else { prefix.as_str() };
         (name.to_owned(), Value::List(members.iter().map(|(_, number)| Value::Number(*number)).collect()))
     };
@@ -181,14 +181,14 @@ pub(super) fn last_of(path: &str) -> &str {
     path.rsplit('.').next().unwrap_or(path)
 }
 
-/// Whether a name is one of joint values.
+/// Whether a name denotes joint values.
 pub(crate) fn is_about_joints(name: &str) -> bool {
     let name = name.to_lowercase();
     let last = last_of(&name);
     last.contains("joint") || matches!(last, "q" | "qpos" | "actual_q" | "angles" | "axes")
 }
 
-/// Whether joint values of this name are of how the joints move or are driven, not of where they are.
+/// Whether joint values of this name describe how the joints move or are driven, not where they are.
 fn is_about_motion(name: &str) -> bool {
     let name = name.to_lowercase();
     let last = last_of(&name);
@@ -213,7 +213,7 @@ pub(crate) fn is_image_name(text: &str) -> bool {
     text.len() < 1024 && folder::is_image(Path::new(text.trim()))
 }
 
-/// What a pose of so many numbers may be.
+/// Poses that an array of this many numbers may be.
 pub(crate) fn of_numbers(numbers: &[f64], name: &str) -> Option<(Numbers, Stated)> {
     if numbers.iter().any(|n| !n.is_finite()) {
         return None;
@@ -258,9 +258,9 @@ fn look(value: &Value, path: &str, file: &str, tracks: &mut Vec<Track>, parts: &
         return;
     }
     match value {
-        // What a result says of its own uncertainty is no series of six poses.
+        // The covariance of a result is not a series of six poses.
         Value::List(items) if is_covariance(items) => {}
-        // Joint values are no poses, however many they are.
+        // Joint values are not poses, whatever their number is.
         Value::List(items) if is_about_joints(path) && items.iter().all(|item| item.numbers(12).is_some()) => {}
         Value::List(items) if value.numbers(16).is_none() && items.len() >= LEAST_POSES => {
             let place = |i: usize| text!("{file}, entry {entry}", file = file, entry = i + 1);
@@ -312,7 +312,8 @@ fn look(value: &Value, path: &str, file: &str, tracks: &mut Vec<Track>, parts: &
     }
 }
 
-/// Whether rows of numbers are a matrix that is symmetric, as those of a covariance are, up to how they are printed.
+/// Whether rows of numbers are a matrix that is symmetric, as those of a covariance are, up to the rounding of printed
+/// numbers.
 fn is_covariance(items: &[Value]) -> bool {
     let rows: Option<Vec<Vec<f64>>> = items.iter().map(|row| row.numbers(16)).collect();
     let Some(rows) = rows.filter(|rows| rows.len() == 6 && rows.iter().all(|row| row.len() == 6)) else { return false };
@@ -355,7 +356,7 @@ fn of_elements(path: &str, file: &str, elements: Vec<(Text, Option<u64>, &Value)
     tracks
 }
 
-/// As `--set poses=` has it: the file and the place in it.
+/// Value of `--set poses=`: the file and the place in it.
 pub(crate) fn track_name(file: &str, path: &str) -> String {
     if path.is_empty() { file.to_owned() } else { format!("{file}:{path}") }
 }
@@ -367,7 +368,7 @@ pub(crate) fn track(name: String, path: &str, stated: Stated, mut samples: Vec<S
     (samples.len() >= LEAST_POSES).then(|| Track { role: by_path(path), name, stated, reading_of: None, samples })
 }
 
-/// What poses of this name are of.
+/// What poses of this name belong to.
 pub(crate) fn role(name: &str) -> Role {
     let name = name.to_lowercase();
     let has = |words: &[&str]| words.iter().any(|word| name.contains(word));
@@ -400,7 +401,7 @@ pub(crate) fn role(name: &str) -> Role {
     if has(&["target", "cam"]) { Role::Target } else { Role::Unknown }
 }
 
-/// What poses at a path of a document are of; of names that OpenCV gives them, the target's.
+/// What poses at a path of a document belong to; with the names of OpenCV, to the target.
 fn by_path(path: &str) -> Role {
     match role(path) {
         Role::Unknown if named::is_of_solve_pnp(path) => Role::Target,
@@ -408,7 +409,8 @@ fn by_path(path: &str) -> Role {
     }
 }
 
-/// What poses in files of this name are of. Many are called after the calibration, whose hand is not the robot's.
+/// What poses in files of this name belong to. Many are named after the calibration, whose "hand" does not mean the
+/// robot.
 pub(crate) fn role_of_files(name: &str) -> Role {
     let mut name = name.to_lowercase();
     for by in ["", "_", "-", " "] {
@@ -428,8 +430,8 @@ pub(crate) fn role_of_files(name: &str) -> Role {
     role(&name)
 }
 
-/// Gives the only series of a document or of files, or the one that is all of them, the role that their name says, where its
-/// own path says none. Of several series some are of another thing than the file is called after.
+/// Gives the only series of a document or of files, or the one that covers all of them, the role of their name, where its
+/// own path has none. Of several series some belong to something other than the file's name.
 pub(crate) fn call_after_files(tracks: &mut [Track], files: &str, of_files: Role) {
     let is_alone = tracks.iter().filter(|track| !track.is_still()).count() <= 1;
     for track in tracks.iter_mut().filter(|_| of_files != Role::Unknown) {
@@ -440,13 +442,14 @@ pub(crate) fn call_after_files(tracks: &mut [Track], files: &str, of_files: Role
     }
 }
 
-/// Whether a table or a program is of the target by its name or that of its folder, which may be one of images of it.
+/// Whether a table or a program is of the target by its name or that of its folder, which may be a folder of images of
+/// it.
 pub(crate) fn is_of_target(file: &str) -> bool {
     let stem = Path::new(file).file_stem().unwrap_or_default().to_string_lossy();
     role(file) == Role::Target && role(&stem) != Role::Robot
 }
 
-/// What poses in a document of this name are of; those of a camera may be of what carries it.
+/// What poses in a document of this name belong to; those of a camera may be those of its mount.
 pub(crate) fn role_of_document(file: &str) -> Role {
     let stem = Path::new(file).file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
     role_of_files(&stem.replace("cam", ""))

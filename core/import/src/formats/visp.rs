@@ -4,7 +4,7 @@
 use super::{File, Format, pose_files, tree};
 use crate::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
 use crate::folder;
-use crate::reader::Reader;
+use crate::formats::reader::Reader;
 use crate::recording::{FoundCamera, FoundTarget, Known, Role, Stated, Track};
 use crate::value::Value;
 use handeye_geometry::camera::{Distortion, Intrinsics};
@@ -54,7 +54,7 @@ fn is_pose(value: &Value) -> bool {
         && value.numbers(6).is_some_and(|numbers| numbers.len() == 6)
 }
 
-/// What is known of a series of such files.
+/// Adds what is known about a series of such files.
 fn know(track: &mut Track) {
     let by = |what: &str| format!("ViSP's pose vectors are {what}");
     track.stated = Stated {
@@ -75,7 +75,7 @@ fn know(track: &mut Track) {
     }
 }
 
-/// A value by its name, wherever it stands first.
+/// The first value with a name, anywhere in the tree.
 fn first<'a>(value: &'a Value, name: &str) -> Option<&'a Value> {
     match value {
         Value::Map(entries) => {
@@ -109,8 +109,8 @@ fn camera(value: &Value, file: &str) -> Option<FoundCamera> {
     })
 }
 
-/// A target from the note that lies beside ViSP's data: `Chessboard`, `9 x 6`, `square size: 0.0236 m`, or the family of a tag
-/// and its size, without its number.
+/// A target from the note next to ViSP's data: `Chessboard`, `9 x 6`, `square size: 0.0236 m`, or the family of a tag and its
+/// size, without its number.
 fn target(text: &str, file: &str) -> Option<FoundTarget> {
     let lower = text.to_lowercase();
     let size = |key: &str| -> Option<f64> {

@@ -1,4 +1,4 @@
-//! What is tried: every series with every source, in every pairing, under every convention that is left open.
+//! The cases to try: every series with every source, in every pairing, under every open convention.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,6 +8,7 @@ use super::Sights;
 use crate::conventions::{AngleUnit, Direction, Euler, LengthUnit, Reading, RotationForm, angles_for, lengths_for};
 use crate::error::{ImportError, reasons};
 use crate::formats::tree::LEAST_POSES;
+use crate::formats::with_poses;
 use crate::hypothesis::{Hypothesis, Source};
 use crate::pairing::{Pairing, pairings};
 use crate::recording::{ImageFile, Numbers, Recording, Role, Sample, Stated, Track};
@@ -22,8 +23,8 @@ use handeye_wording::text;
 const NEAREST_M: f64 = 0.03;
 const FARTHEST_M: f64 = 20.0;
 
-/// Series of the robot with a source each that are paired: of sixteen series of either, all. Where there are more, those come
-/// first that names say to be the robot's and the target's, and that are equally long.
+/// Series of the robot with a source each that are paired: all for up to sixteen series of each. Where there are more, those
+/// come first whose names denote the robot and the target, and that are equally long.
 const MOST_SOURCES: usize = 256;
 /// Hypotheses that are tried; a recording of one robot and one camera has some hundreds.
 const MOST_CASES: usize = 50_000;
@@ -39,7 +40,7 @@ pub(super) struct Case {
     pub class: Direction,
     /// The places of the camera and the directions that mean it.
     pub labels: Vec<(Mode, Direction)>,
-    /// By how much the angles of robot and target differ.
+    /// Difference between the angles of robot and target.
     pub unlike_rad: f64,
 }
 
@@ -144,7 +145,7 @@ pub(super) fn sources(
                 continue;
             }
             rules.push(pairing.rule.clone());
-            // What is found by its content is made after the others.
+            // Pairings by content are made after the others.
             if settings.pairing.as_deref().is_none_or(|rule| rule == pairing.rule || rule == "aligned") {
                 out.push(Paired { source, robot, pairing });
             }
@@ -189,7 +190,7 @@ pub(super) fn sources(
             )
         };
         let need = LEAST_POSES;
-        return Err(ImportError::NoPoses { folder: recording.root.clone(), need, seen });
+        return Err(ImportError::NoPoses { folder: recording.root.clone(), need, formats: with_poses(), seen });
     }
     Ok((out, untried))
 }
@@ -205,7 +206,7 @@ fn rarity(recording: &Recording, source: Source, robot: usize) -> (usize, usize)
 }
 
 /// Whether a pairing has as many different poses of the robot, and of a target whose poses are recorded, as a recording has at
-/// least: two calibrations that are printed one after the other, some of them again, are none.
+/// least: two calibrations that are printed one after the other, some of them repeated, do not count.
 fn moves(recording: &Recording, robot: usize, source: Source, pairing: &Pairing) -> bool {
     let different = |track: usize, of: &mut dyn Iterator<Item = usize>| {
         let samples = &recording.tracks[track].samples;
@@ -229,7 +230,7 @@ fn moves(recording: &Recording, robot: usize, source: Source, pairing: &Pairing)
         }
 }
 
-/// Poses of a target stand for the images that they were found in.
+/// Poses of a target replace the images that they were found in.
 fn as_images(track: &Track) -> Vec<ImageFile> {
     let image = |(i, sample): (usize, &Sample)| ImageFile {
         // In the order of the series, whatever they are called.
@@ -256,7 +257,7 @@ fn largest(track: &Track) -> (f64, f64) {
     out
 }
 
-/// What the numbers of a series may mean.
+/// Possible meanings of the numbers of a series.
 fn readings(
     track: &Track,
     length: Option<LengthUnit>,
@@ -297,9 +298,9 @@ fn readings(
     out
 }
 
-/// That the robot stood all the time, by one of the meanings that its numbers may have.
+/// The error that the robot was at rest all the time, by one of the possible meanings of its numbers.
 pub(super) fn did_not_move(recording: &Recording, paired: &[Paired], settings: &Settings) -> Option<ImportError> {
-    // As far apart as two reports of an arm at rest at the most.
+    // Largest distance between two reported poses of an arm at rest.
     const AT_REST_M: f64 = 1e-3;
     let spread = |track: &Track, reading: &Reading| {
         let poses: Vec<Isometry3<f64>> = track.samples.iter().filter_map(|s| reading.transform(&s.numbers)).collect();
@@ -374,8 +375,8 @@ pub(super) fn cases(recording: &Recording, paired: &[Paired], settings: &Setting
     (out, untried)
 }
 
-/// When both sides are in one unit no data tell which it is, and nobody has recorded both in centimetres: only where it is
-/// the one that is left.
+/// When both sides are in one unit no data show which it is, and recordings of both in centimetres are not known: only
+/// where it is the only unit left.
 fn without_centimetres(readings: Vec<Reading>) -> Vec<Reading> {
     let is_other = |reading: &Reading| reading.length != LengthUnit::Centimetre;
     if readings.iter().any(is_other) { readings.into_iter().filter(is_other).collect() } else { readings }

@@ -1,15 +1,15 @@
 //! An arm with an RGB-D camera behind a remote API: what the workbench drives.
 //!
 //! [`CellClient`] finds the objects of the scene and holds two connections, because a connection can do one thing at a
-//! time: [`Arm`] moves and stops, [`CameraFeed`] takes frames, and after [`CellClient::split`] each lives on a thread of
-//! its own, so that images keep coming while the arm moves.
+//! time: [`Arm`] moves and stops, [`CameraFeed`] takes frames, and after [`CellClient::split`] each has its own thread,
+//! so that images keep coming while the arm moves.
 //!
 //! # How motions are driven
 //! Each point of a motion, a jog or a path that is followed is computed here and sent for one pass of the simulation: the
-//! API has no way to end a motion of another client, and a client that dies must leave an arm that stands still. The
-//! simulation is not taken into stepping mode for it: it keeps its pace, other clients keep theirs, and a crash cannot
-//! freeze it; the price is that a slow network makes the arm pause for a pass now and then on its way, which changes
-//! nothing about where it ends. Only the inverse kinematics of an arm that is not known is left to the server.
+//! API has no way to end a motion of another client, and a client that crashes must leave an arm at rest. The simulation
+//! is not taken into stepping mode for it: it keeps its pace, other clients keep theirs, and a crash cannot freeze it;
+//! the price is that a slow network makes the arm pause for a pass now and then on its way, which changes nothing about
+//! where it ends. Only the inverse kinematics of an arm that is not known is left to the server.
 
 mod arm;
 mod board;
@@ -41,6 +41,7 @@ use std::sync::Arc;
 use handeye_arm::JointKind;
 use handeye_geometry::camera::Intrinsics;
 
+pub use crate::error::version_name;
 pub use arm::{Arm, MotionTolerance, SettleOptions};
 pub use board::{BoardMotion, BoardPath, UnknownPath};
 pub use camera::{CameraFeed, Frame};
@@ -57,7 +58,6 @@ pub use reach::{ArmKinematics, UnknownKinematics};
 pub use room::{BoardReach, FollowPlace, NoPlace};
 pub use surroundings::{Among, SceneObstacles};
 pub use truth::{GroundTruth, TRUTH_FUNCTION};
-pub use version::version_name;
 pub use views::BoardInView;
 
 use objects::CellObjects;
@@ -72,9 +72,9 @@ use super::sim::{SensorOptics, Sim, SimulationState};
 pub struct CellInfo {
     /// Where the server is.
     pub endpoint: Endpoint,
-    /// Version of the simulator, 41000 is 4.10.0; 0 when it does not tell.
+    /// Version of the simulator, 41000 is 4.10.0; 0 when it does not report it.
     pub program_version: i64,
-    /// Whether it is a cell of this project, which CoppeliaSim's version number does not tell.
+    /// Whether it is a cell of this project, which CoppeliaSim's version number does not show.
     pub is_handeye_cell: bool,
     /// The joints from the base up.
     pub joints: Vec<CellJoint>,
@@ -136,7 +136,7 @@ impl CellClient {
         &mut self.camera
     }
 
-    /// The two halves, each for a thread of its own.
+    /// The two halves, each for its own thread.
     pub fn split(self) -> (Arm, CameraFeed) {
         (self.arm, self.camera)
     }
@@ -183,7 +183,7 @@ fn discover(
     Ok((sim, objects, info))
 }
 
-/// The version first: a server that is too old lacks what the rest asks for.
+/// The version first: a server that is too old lacks what the rest needs.
 fn look_around(sim: &mut Sim, paths: &CellPaths) -> Result<(Arc<CellObjects>, Arc<CellInfo>), LinkError> {
     let program_version = version::program_version(sim)?;
     let objects = CellObjects::find(sim, paths)?;

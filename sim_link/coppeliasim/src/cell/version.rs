@@ -4,10 +4,10 @@ use crate::error::LinkError;
 use crate::sim::Sim;
 
 /// The oldest version that is supported: the first in which `sim.moveToPose` takes a map of parameters and
-/// `sim.getShapeBB` tells where the box about a shape is.
+/// `sim.getShapeBB` reports where the box about a shape is.
 const OLDEST: i64 = 40_700;
 
-/// The version of the simulator, 41000 is 4.10.0; 0 when it does not tell.
+/// The version of the simulator, 41000 is 4.10.0; 0 when it does not report it.
 ///
 /// # Errors
 /// [`LinkError::TooOld`]; otherwise as for any call.
@@ -19,9 +19,4 @@ pub(super) fn program_version(sim: &mut Sim) -> Result<i64, LinkError> {
         Err(LinkError::Remote { .. } | LinkError::UnexpectedReply { .. }) => Ok(0),
         Err(error) => Err(error),
     }
-}
-
-/// How people write a version: 41000 is 4.10.0.
-pub fn version_name(version: i64) -> String {
-    format!("{}.{}.{}", version / 10_000, version / 100 % 100, version % 100)
 }

@@ -1,6 +1,7 @@
 //! A robot and a camera behind [drivers](handeye_driver).
 
 mod camera;
+mod chosen;
 mod control;
 mod motion;
 #[cfg(test)]
@@ -12,9 +13,9 @@ use handeye_coppeliasim::CancelToken;
 use handeye_driver::{BadSpec, DriverCell, DriverCellSpec, DriverError, DriverHost, DriverOptions, NoCell};
 use handeye_geometry::frames::{Base, Pose, Tip};
 
-use crate::Drivers;
 use crate::{CameraPort, Cell, Connected, ControlPort, MotionPort, PortError};
 use camera::DriverCamera;
+pub use chosen::Drivers;
 use control::DriverControl;
 use handeye_wording::Text;
 use handeye_wording::text;
@@ -23,7 +24,7 @@ use motion::DriverMotion;
 /// Starts the drivers, or connects to them, once for all workers; and again when they have ended.
 pub struct DrivenCell {
     drivers: Drivers,
-    /// Or why these drivers are none.
+    /// The host, or why these drivers are not valid.
     host: Result<DriverHost, BadSpec>,
     typed: TypedPose,
 }
@@ -109,7 +110,7 @@ impl TypedPose {
     }
 }
 
-/// The camera's driver stands in for the robot's where a person types the poses.
+/// Where a person types the poses, the camera's driver replaces the robot's.
 fn spec(drivers: &Drivers) -> Result<DriverCellSpec, BadSpec> {
     let robot = drivers.robot.as_deref().map(str::parse).transpose()?;
     let camera = drivers.camera.as_deref().map(str::parse).transpose()?;
@@ -120,7 +121,7 @@ fn spec(drivers: &Drivers) -> Result<DriverCellSpec, BadSpec> {
     }
 }
 
-/// Why there are no drivers, for a connection.
+/// The connection error when there are no drivers.
 fn no_cell(why: NoCell) -> PortError {
     match why {
         NoCell::Later { error, tries, pause } => PortError::Later { why: error.into(), tries, pause },
@@ -137,7 +138,7 @@ fn no_cell(why: NoCell) -> PortError {
     }
 }
 
-/// What an error of a driver means for a connection.
+/// The connection error for an error of a driver.
 #[expect(clippy::needless_pass_by_value, reason = "it is used up")]
 fn port_error(error: DriverError) -> PortError {
     let text = Text::from(&error);

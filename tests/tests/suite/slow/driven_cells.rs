@@ -1,4 +1,4 @@
-//! The window over drivers: programs of their own, two clocks, a driver that is killed, a robot whose poses are typed.
+//! The window with drivers: programs of their own, two clocks, a driver that is killed, a robot whose poses are typed.
 
 use std::path::{Path, PathBuf};
 use std::process::Command as Program;
@@ -26,7 +26,7 @@ fn cell() -> (CellServer, Endpoint) {
     (cell, endpoint)
 }
 
-/// The command of a driver of one part of that cell, with its clock so far ahead.
+/// The command of a driver of one part of that cell, with its clock ahead by this much.
 fn driver(cell: &Endpoint, part: &str, clock_s: f64) -> String {
     format!("'{}' driver fake --connect {cell} --only {part} --clock {clock_s}", handeye_binary().display())
 }
@@ -47,7 +47,7 @@ fn is_solved(model: &Model) -> bool {
     model.solve.status == SolveStatus::Idle && model.solve.fresh
 }
 
-/// How far the answer is from the truth \[mm\], which no driver reports.
+/// The error of the answer \[mm\] relative to the truth, which no driver reports.
 fn error_mm(bench: &Workbench, truth: &Pose<Tip, Camera>) -> f64 {
     let solved = bench.model().solve.current().expect("solved");
     let found = solved.result.hand_eye.as_ref().expect("a robot").translation_m;
@@ -86,7 +86,7 @@ fn two_drivers_with_clocks_80_ms_apart_calibrate_and_outlive_one_that_is_killed(
     bench.allow(taught::Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
     bench.until("five captures", |model| model.document().captures.len() >= 5);
 
-    // Its process alone: the camera's goes on.
+    // Its process only: the camera's continues.
     let robots = format!("driver fake --connect {endpoint} --only robot");
     let killed = Program::new("pkill").args(["-KILL", "-f", "--", &robots]).status();
     assert!(killed.expect("pkill runs").success());
@@ -97,8 +97,8 @@ fn two_drivers_with_clocks_80_ms_apart_calibrate_and_outlive_one_that_is_killed(
     bench.click(connect::Command::Arm(true));
     bench.until("the permission", Model::is_armed);
     bench.click(taught::Command::ContinueSequence);
-    // The arm may stand there.
-    bench.click(motion::Command::ConfirmMove);
+    // The arm may be there already.
+    bench.click(taught::Command::ConfirmMove);
     bench.until("the rest of the sequence", |model| !model.sequence_runs && model.motion == Motion::Idle);
     bench.until("a solution", is_solved);
     assert_eq!(bench.model().document().captures.len(), 10, "{}", bench.text());
@@ -128,9 +128,9 @@ fn the_arm_behind_a_driver_calibrates_itself_once_it_is_allowed_to_move_whatever
         bench.click(guided::Command::CalibrateForMe);
         let waits = |model: &Model| model.asked.is_some();
         bench.until("the first move that waits", |model| waits(model) && model.document().captures.len() == 1);
-        bench.click(motion::Command::ConfirmMove);
+        bench.click(taught::Command::ConfirmMove);
         bench.until("the second", |model| waits(model) && model.document().captures.len() == 2);
-        bench.click(motion::Command::SetConfirmMoves(false));
+        bench.click(taught::Command::SetConfirmMoves(false));
         bench.until("the end", |model| !model.sequence_runs && model.capture.is_none());
         bench.until("a solution", is_solved);
         let model = bench.model();
@@ -168,7 +168,7 @@ fn a_robot_that_is_moved_by_hand_is_calibrated_with_poses_that_are_typed() {
     let mm = error_mm(&bench, &truth);
     assert!(mm < 0.5, "{mm} mm");
 
-    // The pose of the last capture is not that of the next one.
+    // The pose of the last capture must not be used for the next one.
     bench.click(capture::Command::Take(CapturePurpose::Calibrate));
     bench.until("the refusal", |model| model.refused.is_some());
     assert!(bench.text().contains("type the pose that its pendant shows"), "{}", bench.text());

@@ -1,4 +1,4 @@
-//! The arm follows the board, by what a user clicks, on the built-in cell over its real socket.
+//! The arm follows the board, controlled by clicks, on the built-in cell over its real socket.
 
 use std::process::Command as Process;
 
@@ -12,7 +12,7 @@ use handeye_tests::workbench::Workbench;
 use handeye_tests::{handeye_binary, workspace_root};
 use handeye_track::State;
 use handeye_workbench::model::{BoardMotion, BoardPath, CellSource, FollowRequest, FollowStatus, Model};
-use handeye_workbench::{connect, motion, track};
+use handeye_workbench::{connect, motion, taught, track};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
@@ -21,14 +21,14 @@ const TIME_STEP_S: f64 = 0.03;
 /// Speed of the board that is followed [m/s].
 const SPEED_M_S: f64 = 0.05;
 
-/// Where following begins: of the ten, the pose furthest from the column of the arm, where it has most room.
+/// Where following starts: of the ten, the pose furthest from the column of the arm, where it has most room.
 const FIRST: CaptureId = CaptureId(7);
 
-/// Hidden boards; `HANDEYE_TRIALS` has more of them.
+/// Number of hidden boards; `HANDEYE_TRIALS` sets more.
 const TRIALS: u32 = 3;
 
-/// The cell, and a client that can have its passes wait for the workbench: what is measured is then what the workbench
-/// does with the images, however busy the machine is.
+/// The cell, and a client that can make its passes wait for the workbench: the measurement is then independent of how
+/// busy the machine is.
 struct Cell {
     pacer: Sim,
     _server: CellServer,
@@ -43,12 +43,12 @@ impl Cell {
         (Self { pacer, _server: server }, endpoint)
     }
 
-    /// From now on a pass comes only when [`Cell::pass`] asks for it, or as time goes by.
+    /// From now on a pass comes only when [`Cell::pass`] requests it, or as time passes.
     fn paced(&mut self, is_paced: bool) {
         self.pacer.set_stepping(is_paced).expect("a call");
     }
 
-    /// Has a pass go by, and waits until its image is tracked.
+    /// Runs a pass, and waits until its image is tracked.
     fn pass(&mut self, bench: &mut Workbench) {
         self.pacer.step(&CallOptions::default()).expect("a pass");
         let now_s = self.pacer.get_simulation_time().expect("a call");
@@ -102,7 +102,7 @@ fn tracking_at(folder: &std::path::Path, file: &str, config: CellConfig, first: 
     bench.until("a solution", |model| model.solve.current().is_some());
     bench.click(motion::Command::GoToCapture(first));
     // The arm may be there already.
-    bench.click(motion::Command::ConfirmMove);
+    bench.click(taught::Command::ConfirmMove);
     bench.until("the arm at the first pose", |model| model.motion == handeye_workbench::model::Motion::Idle);
     bench.click(track::Command::SetTracking(true));
     bench.until("the board", is_tracked);
@@ -117,7 +117,7 @@ fn sim_time_s(model: &Model) -> f64 {
     model.frame.as_ref().map_or(0.0, |frame| frame.info.sim_time_s)
 }
 
-/// What the camera really sees in the newest image: by the cell's own word for camera and board.
+/// What the camera truly sees in the newest image: from the cell's own poses of camera and board.
 fn true_view(model: &Model) -> Pose<Camera, Target> {
     let truth = model.cell.as_ref().and_then(|cell| cell.truth.as_ref()).expect("the cell's truth");
     let frame = &model.frame.as_ref().expect("an image").info;
@@ -125,12 +125,12 @@ fn true_view(model: &Model) -> Pose<Camera, Target> {
     (frame.base_from_tip.expect("a cell reports it") * truth.tip_from_camera).inverse() * base_from_target
 }
 
-/// What tracking makes of the newest image, on a cell that says nothing of where its board is.
+/// The tracking result for the newest image, on a cell that does not report where its board is.
 fn seen_view(model: &Model) -> Pose<Camera, Target> {
     model.track.newest.as_ref().and_then(|newest| newest.update.seen.as_ref()).expect("seen").camera_from_target
 }
 
-/// How far the view is from the one to be kept over some simulated time: RMS \[m, rad\].
+/// Deviation of the view from the one to keep over some simulated time: RMS \[m, rad\].
 fn deviation(bench: &mut Workbench, cell: &mut Cell, kept: &Pose<Camera, Target>, seconds: f64) -> [f64; 2] {
     deviation_of(true_view, bench, cell, kept, seconds)
 }
@@ -175,7 +175,7 @@ fn the_view_is_kept_while_the_board_moves_and_exactly_once_it_stands() {
     assert!(metres <= 2e-3 && radians.to_degrees() <= 0.2, "{metres} m, {radians} rad");
 
     cell.paced(false);
-    // Nothing but the stop is pressed; it ends the following as it ends everything.
+    // Only the stop is pressed; it ends following like everything else.
     bench.click(motion::Command::Stop);
     bench.until("the arm at rest", |model| !model.stop_pending && matches!(model.track.follow, FollowStatus::Ended(_)));
 }
@@ -211,7 +211,7 @@ const LAST: CaptureId = CaptureId(10);
 fn after_the_ten_poses_one_click_follows_the_board_along_every_path_for_minutes() {
     let seconds = std::env::var("HANDEYE_FOLLOW_S").ok().and_then(|text| text.parse().ok()).unwrap_or(6.0);
     let folder = tempfile::tempdir().expect("a folder");
-    // The cell as it is built in: what a person meets first.
+    // The built-in cell: what a user sees first.
     let scene = Scene::reference().expect("the scene");
     let (mut bench, mut cell) =
         tracking_at(folder.path(), "assets/scenes/reference.toml", CellConfig::new(scene), LAST);
@@ -224,7 +224,7 @@ fn after_the_ten_poses_one_click_follows_the_board_along_every_path_for_minutes(
         bench.click(track::Command::MoveBoard(BoardMotion { path, speed_m_s: SPEED_M_S }));
         let [metres, radians] = deviation(&mut bench, &mut cell, &kept, seconds);
         println!("{path}: {:.2} mm, {:.3}° RMS in {seconds} s", metres * 1e3, radians.to_degrees());
-        // A board that jumps every two seconds is 80 mm away at first, and caught up with in less than one.
+        // A board that jumps every two seconds is 80 mm away at first, and the arm catches up in less than one.
         let most_m = if path == BoardPath::Step { 60e-3 } else { 10e-3 };
         assert!(metres <= most_m, "{path}: {metres} m");
         bench.click(track::Command::MoveBoard(BoardMotion { path: BoardPath::Still, speed_m_s: SPEED_M_S }));
@@ -267,7 +267,7 @@ fn an_arm_whose_board_is_hidden_comes_to_rest_within_its_limits() {
             assert!(now.sim_time_s < hidden_s + 5.0, "trial {trial}: the arm still moves; {}", bench.text());
             before = now;
         }
-        // The arm waits for a while before it gives up; until then the board would go out of the image of the first pose.
+        // The arm waits for a while before it stops; until then the board would leave the image of the first pose.
         bench.click(track::Command::MoveBoard(BoardMotion { path: BoardPath::Still, speed_m_s: 0.1 }));
         cell.paced(false);
         bench.until("the end of following", |model| matches!(model.track.follow, FollowStatus::Ended(_)));
@@ -278,7 +278,7 @@ fn an_arm_whose_board_is_hidden_comes_to_rest_within_its_limits() {
         );
         bench.click(track::Command::HideBoard(false));
         bench.click(motion::Command::GoToCapture(FIRST));
-        bench.click(motion::Command::ConfirmMove);
+        bench.click(taught::Command::ConfirmMove);
         bench.until("the arm at the first pose", |model| model.motion == handeye_workbench::model::Motion::Idle);
         bench.until("the board", is_tracked);
     }

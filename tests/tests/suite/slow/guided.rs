@@ -1,5 +1,5 @@
-//! Guided capture: from the board in view to a calibration of the accuracy that was asked for, from the command line and by
-//! one click, on the built-in cell over its real socket.
+//! Guided capture: from the board in view to a calibration with the requested accuracy, from the command line and with one
+//! click, on the built-in cell over its real socket.
 
 use std::path::Path;
 use std::process::{Command as Process, Output};
@@ -43,25 +43,26 @@ fn a_noisy_cell_and_a_seven_joint_arm_reach_the_goal_and_the_answer_is_checked()
         assert_eq!(guided.ending.as_ref().map(|it| it.code.as_str()), Some("goal_reached"), "{name}: {guided:?}");
         let stated_mm = result.quality.tip_error_95_mm.expect("stated");
         assert!(stated_mm <= goal_mm, "{name}: {stated_mm} mm");
-        // Whatever was chosen, the truth decides: the translation of the camera alone is off by no more than a point is.
+        // However the poses were chosen, the truth decides: the error of the camera's translation alone is no larger
+        // than that of a point.
         let truth = result.truth.expect("the cell publishes its truth");
         let off_mm = truth.translation_error_mm.expect("known");
         println!("{name}: {} views, stated {stated_mm:.3} mm, camera off by {off_mm:.3} mm", result.views.len());
         assert!(off_mm < 2.0 * goal_mm, "{name}: {off_mm} mm");
         assert!(result.views.len() <= 25, "{name}: {} views", result.views.len());
         assert_eq!(result.verification.as_ref().map(|it| it.captures), Some(3), "{name}");
-        // The same in the session, for whoever studies it.
+        // The same in the session, for later study.
         let kept = std::fs::read_to_string(session.join("guided.json")).expect("the record");
         assert_eq!(&serde_json::from_str::<GuidedRecord>(&kept).expect("JSON"), guided);
         let captured = guided.steps.iter().filter(|step| step.outcome == "captured").count();
-        // The first view is where the arm stood.
+        // The first view is where the arm was.
         assert_eq!(captured + 1, result.views.len(), "{name}");
         assert!(guided.steps.iter().any(|step| step.promised_mm.is_some() && step.achieved_mm.is_some()));
     }
 }
 
-/// Its links are off, and a point in space is known to no better than a millimetre by any transform; with corrected commands a tool
-/// arrives all the same, and a goal is asked of that.
+/// Its links have errors, and no transform gives a point in space to better than a millimetre; with corrected commands a tool gets
+/// there all the same, and the goal applies to that.
 #[test]
 fn a_nominal_arm_reaches_the_goal_with_corrected_commands() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -79,7 +80,7 @@ fn a_nominal_arm_reaches_the_goal_with_corrected_commands() {
     let goal = result.findings.iter().find(|finding| finding.code == "goal_reached").expect("it is found, too");
     assert!(goal.text.contains("handeye correct"), "{}", goal.text);
     assert!(result.views.len() <= 25, "{} views", result.views.len());
-    // The captures that check it say the same.
+    // The verification captures confirm it.
     let checked = result.verification.expect("three captures");
     let by_arm = checked.corrected.as_ref().expect("their joints are known");
     assert!(by_arm.centre_rms_mm < 0.5 * checked.centre_rms_mm && by_arm.centre_rms_mm < 0.3, "{checked:?}");
@@ -95,7 +96,7 @@ fn a_goal_out_of_reach_fails_with_the_reason_and_keeps_the_answer() {
     let output = auto(folder.path(), &[&arguments[..], &["--scene", &scene]].concat());
     assert_eq!(output.status.code(), Some(1));
     let reported = String::from_utf8_lossy(&output.stderr).into_owned();
-    // A robot that repeats to 0.05 mm brings no tool within a thousandth.
+    // A robot with a repeatability of 0.05 mm gets no tool within a thousandth.
     assert!(reported.contains("the goal is not reached") && reported.contains("does not repeat"), "{reported}");
     let result = CalibrationResult::read(&folder.path().join("session/result.json")).expect("a result all the same");
     assert_eq!(result.views.len(), 9);
@@ -119,8 +120,8 @@ fn connected(folder: &Path) -> (Workbench, CellServer) {
     bench.until("passing time", |model| model.resting_simulation().is_none());
     bench.until("the board", |model| model.board_seen_s.is_some());
     bench.click(motion::Command::SetJog(JogSettings { speed: Some(1.0), ..JogSettings::default() }));
-    // Behind an address there may be a real arm, and each move waits for a person; the first one always does.
-    bench.click(motion::Command::SetConfirmMoves(false));
+    // Behind an address the arm may be real, and each move waits for the user; the first one always does.
+    bench.click(taught::Command::SetConfirmMoves(false));
     (bench, cell)
 }
 
@@ -160,7 +161,7 @@ fn a_stop_ends_it_at_once_and_it_goes_on_from_there_when_wished() {
     let stopped_s = sim_time(bench.model());
     bench.until("two seconds", |model| sim_time(model) > stopped_s + 2.0);
     assert_eq!(count(bench.model(), Role::Calibration), kept, "nothing goes on by itself");
-    // Captures that there are count.
+    // Existing captures count.
     bench.allow(taught::Command::ContinueSequence);
     bench.until("the end", |model| !model.sequence_runs && count(model, Role::Verification) == 3);
     assert!(count(bench.model(), Role::Calibration) <= kept + 16);
@@ -174,12 +175,12 @@ fn guided(model: &Model) -> Option<&GuidedProgress> {
 fn step_by_step_each_move_is_let_or_skipped_and_all_of_it_is_kept_in_the_session() {
     let folder = tempfile::tempdir().expect("a folder");
     let (mut bench, _cell) = connected(folder.path());
-    bench.click(motion::Command::SetConfirmMoves(true));
+    bench.click(taught::Command::SetConfirmMoves(true));
     bench.click(guided::Command::CalibrateForMe);
     let waits = |model: &Model| guided(model).is_some() && model.asked.is_some();
     bench.until("a pose that waits", waits);
     let first = guided(bench.model()).expect("it runs").ahead[0].base_from_tip;
-    bench.click(motion::Command::SkipMove);
+    bench.click(taught::Command::SkipMove);
     bench.until("another one", |model| {
         waits(model) && guided(model).is_some_and(|it| it.ahead[0].base_from_tip != first)
     });
@@ -187,14 +188,14 @@ fn step_by_step_each_move_is_let_or_skipped_and_all_of_it_is_kept_in_the_session
         let before = bench.model().robot.as_ref().expect("connected").joints_rad;
         bench.until("a pose that waits", waits);
         assert_eq!(bench.model().robot.as_ref().expect("connected").joints_rad, before, "it moved by itself");
-        bench.click(motion::Command::ConfirmMove);
+        bench.click(taught::Command::ConfirmMove);
         bench.until("a capture", |model| count(model, Role::Calibration) == captures);
     }
     bench.until("a pose that waits", waits);
     bench.click(motion::Command::Stop);
     bench.until("the end", |model| !model.sequence_runs);
     let session = bench.model().session.folder.clone().expect("a session");
-    // It is written beside the window.
+    // It is written on another thread.
     let outcomes = || -> Option<Vec<String>> {
         let kept = std::fs::read_to_string(session.join("guided.json")).ok()?;
         let record: GuidedRecord = serde_json::from_str(&kept).expect("whole at any time");
@@ -205,7 +206,7 @@ fn step_by_step_each_move_is_let_or_skipped_and_all_of_it_is_kept_in_the_session
     });
 }
 
-/// The hand is a motion of the arm to where the view that is wanted would be seen; nothing else tells the arm to go.
+/// The hand is simulated by motions of the arm to where the wanted view would be seen; nothing else moves the arm.
 #[test]
 fn a_person_who_brings_about_the_views_that_are_asked_for_gets_a_checked_answer() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -218,7 +219,7 @@ fn a_person_who_brings_about_the_views_that_are_asked_for_gets_a_checked_answer(
         let Some(view) = wanted(bench.model()) else { break };
         let truth = bench.model().cell.as_ref().and_then(|cell| cell.truth.clone()).expect("a simulated cell");
         let base_from_target = truth.base_from_target.expect("it says where its board is");
-        // Where the image looks like the one that is wanted, whatever lens that was drawn by.
+        // Where the image matches the wanted one, whatever lens that was drawn with.
         let target = bench.model().document().meta.target;
         let corner = |(index, point)| {
             let point: Point3<f64> = view.camera_from_target.isometry() * point;

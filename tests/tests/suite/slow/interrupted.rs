@@ -1,4 +1,4 @@
-//! Commands whose simulation is paused or ended meanwhile, or whose server dies.
+//! Commands whose simulation is paused or ended in between, or whose server dies.
 
 use std::io::{BufReader, Read as _};
 use std::path::{Path, PathBuf};
@@ -14,24 +14,24 @@ use handeye_tests::CellProcess;
 use handeye_tests::process::{end_of, signal, start, until_message};
 use handeye_tests::workbench::Workbench;
 use handeye_workbench::model::{CaptureOptions, CapturePurpose, CaptureWait, CellSource, Model};
-use handeye_workbench::{capture, connect, motion, taught};
+use handeye_workbench::{capture, connect, taught};
 use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::solved::copy_of_session;
 
-/// As long as a client waits for a reply: a command that asks a dead server again takes that, and one that does not takes
-/// two seconds at most.
+/// As long as a client waits for a reply: a command that contacts a dead server again takes this long, and one that does
+/// not takes two seconds at most.
 const A_REPLY: Duration = Duration::from_secs(5);
 
-/// How it ends, and what it still says.
+/// How it ends, and its last output.
 fn end(mut child: Child, mut reported: BufReader<ChildStderr>) -> (Option<i32>, String) {
     let mut rest = String::new();
     reported.read_to_string(&mut rest).expect("text");
     (end_of(&mut child).code(), rest)
 }
 
-/// Kills the cell of a command, which has to end soon; what it still says.
+/// Kills the cell of a command, which has to end soon; returns its last output.
 fn end_after(cell: &mut CellProcess, child: Child, reported: BufReader<ChildStderr>) -> String {
     cell.kill();
     let killed = Instant::now();
@@ -69,7 +69,7 @@ impl Auto {
     }
 }
 
-/// A person at the simulator.
+/// A user at the simulator.
 fn person(cell: &CellProcess) -> Arm {
     let options = ConnectionOptions::default();
     Arm::connect(&Endpoint::local(cell.port()), &options, &CellPaths::default()).expect("it answers")
@@ -91,7 +91,7 @@ fn auto_waits_out_a_pause_and_leaves_a_simulation_running_that_it_did_not_start(
     assert_eq!(person.sim().get_simulation_state(), Ok(SimulationState::Running));
 }
 
-/// Waits until the arm has moved and then stands for so many passes.
+/// Waits until the arm has moved and is then at rest for this many passes.
 fn until_it_stands(person: &mut Arm, passes: u32) {
     let start = person.joint_values().expect("an answer");
     while person.joint_values().expect("an answer") == start {}
@@ -109,7 +109,7 @@ fn until_it_stands(person: &mut Arm, passes: u32) {
 fn auto_takes_a_capture_again_whose_images_a_pause_broke_off() {
     let auto = Auto::on_a_cell();
     let mut person = person(&auto.cell);
-    // With so many images to average the arm stands at a pose longer than it is on its way to it.
+    // With this many images to average the arm is at a pose longer than it moves towards it.
     let (child, mut reported) = auto.start(&["--frames", "64"]);
     until_message(&mut reported, "pose 1 of 10 captured");
     until_it_stands(&mut person, 20);
@@ -134,7 +134,7 @@ fn a_sequence_of_the_window_goes_on_after_a_pause_with_the_pose_that_has_no_capt
     });
     bench.click(connect::Command::StartSimulation);
     bench.until("passing time", |model| model.resting_simulation().is_none());
-    // So many that the pause comes between two of them, however busy the machine is.
+    // Enough that the pause comes between two of them, however busy the machine is.
     bench.click(capture::Command::SetOptions(CaptureOptions { frames: 32, ..CaptureOptions::default() }));
     bench.until("the reference poses", |model| model.taught().len() == 10);
     bench.allow(taught::Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
@@ -151,14 +151,14 @@ fn a_sequence_of_the_window_goes_on_after_a_pause_with_the_pose_that_has_no_capt
     bench.until("passing time", |model| model.resting_simulation().is_none());
     bench.click(capture::Command::SetOptions(CaptureOptions::default()));
     bench.click(taught::Command::ContinueSequence);
-    // The arm stands at the second pose, or was stopped before it: the first move is the one to the third, or to the second.
+    // The arm is at the second pose, or was stopped before it: the first move is to the third, or to the second.
     bench.until("the first move that waits", |model| model.asked.is_some());
-    bench.click(motion::Command::ConfirmMove);
+    bench.click(taught::Command::ConfirmMove);
     bench.until("the end of the sequence", |model| !model.sequence_runs);
     assert_eq!(bench.model().document().captures.len(), 10, "{}", bench.text());
 }
 
-/// Has the arm stand where it saw the board, with room to follow it.
+/// Moves the arm to where it saw the board, with room to follow it.
 fn before_the_board(person: &mut Arm, session: &Path) {
     person.sim().start_simulation().expect("an answer");
     let session = Session::open(session).expect("a session");

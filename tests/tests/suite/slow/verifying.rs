@@ -1,4 +1,4 @@
-//! Verification at poses that the program plans, by what a user clicks, on the built-in cell over its real socket.
+//! Verification at poses that the program plans, controlled by clicks, on the built-in cell over its real socket.
 
 use handeye_cell::scene::Scene;
 use handeye_geometry::frames::{Base, Pose, Tip};
@@ -9,7 +9,7 @@ use handeye_tests::{handeye_binary, hurry};
 use handeye_workbench::model::{CellSource, JogSettings, Model, Motion};
 use handeye_workbench::{connect, motion, taught};
 
-/// The ten reference poses, captured and solved, and a cell to verify on. At full speed, or it takes minutes.
+/// The ten reference poses, captured and solved, and a cell to verify on. At full speed, otherwise it takes minutes.
 fn solved(folder: &std::path::Path) -> (Workbench, CellServer) {
     let session = folder.join("session");
     let made = std::process::Command::new(handeye_binary())
@@ -41,7 +41,7 @@ fn poses(model: &Model, role: Role) -> Vec<Pose<Base, Tip>> {
 fn a_calibration_is_verified_at_planned_poses_that_were_not_in_the_fit() {
     let folder = tempfile::tempdir().expect("a folder");
     let (mut bench, _cell) = solved(folder.path());
-    bench.click(motion::Command::SetConfirmMoves(false));
+    bench.click(taught::Command::SetConfirmMoves(false));
     bench.allow(taught::Command::VerifyAtPlanned);
     bench.until("the sequence", |model| model.sequence_runs);
     bench.until("its end", |model| !model.sequence_runs);
@@ -68,7 +68,7 @@ fn a_calibration_is_verified_at_planned_poses_that_were_not_in_the_fit() {
 fn a_stop_ends_the_verification_and_keeps_what_was_captured() {
     let folder = tempfile::tempdir().expect("a folder");
     let (mut bench, _cell) = solved(folder.path());
-    bench.click(motion::Command::SetConfirmMoves(false));
+    bench.click(taught::Command::SetConfirmMoves(false));
     bench.allow(taught::Command::VerifyAtPlanned);
     bench.until("a capture", |model| !poses(model, Role::Verification).is_empty());
     bench.click(motion::Command::Stop);

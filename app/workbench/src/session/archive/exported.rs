@@ -6,7 +6,7 @@ use std::time::SystemTime;
 
 use handeye_session::JOURNAL;
 
-use crate::model::exports_of;
+use crate::live::state::exports_of;
 
 /// Whether the folder for exports has a file that is no older than the last change of the session. A folder that cannot
 /// be read counts as empty.

@@ -10,7 +10,7 @@ use handeye_session::{Capture, Document, Role, Store};
 
 use super::{Archive, free_folder, timestamp_rfc3339};
 use crate::import::state::Converted;
-use crate::model::Severity;
+use crate::messages::state::Severity;
 use crate::sample;
 use crate::session;
 use crate::session::start;

@@ -15,8 +15,10 @@ use handeye_result::guided_record::{GUIDED_RECORD, GuidedRecord};
 use handeye_session::{Document, Edit, SessionError, SessionMeta, Store};
 
 use crate::capture::Measured;
+use crate::capture::state::{CaptureRefused, CaptureWait, RefusalKind};
 use crate::import::state::Converted;
-use crate::model::{CaptureRefused, CaptureWait, FolderKind, Observed, RefusalKind, SessionState, Severity};
+use crate::messages::state::Severity;
+use crate::session::state::{FolderKind, Observed, SessionState};
 use crate::text::Text;
 use crate::worker::files::kind_of;
 use crate::worker::link::Outlet;
@@ -45,7 +47,7 @@ impl Beginning {
     }
 }
 
-/// What the archive can be asked for.
+/// Requests to the archive.
 #[derive(Debug)]
 pub enum ArchiveTask {
     /// What a session starts with when the first change needs one. One that was started here, or whose cell is not known, adopts

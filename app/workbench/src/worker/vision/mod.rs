@@ -22,23 +22,25 @@ use search::Search;
 
 use super::channels::{LatestSlot, Tap};
 use super::link::Outlet;
+use crate::capture::state::{CaptureRefused, CaptureWait, LiveDetection};
 use crate::capture::{CaptureRequest, Measured, Sequence, refusal};
-use crate::model::{CaptureRefused, CaptureWait, LiveDetection, LiveFrame, Tracked};
+use crate::live::state::LiveFrame;
 use crate::track::follow_line::FollowLine;
+use crate::track::state::Tracked;
 use crate::track::worker::{TrackedBy, TrackedImage, Tracking};
 use crate::{capture, track};
 
-/// How often the clock is looked at while a capture waits for images that do not come.
+/// How often the clock is checked while a capture waits for images that do not come.
 const CLOCK_PERIOD: Duration = Duration::from_millis(100);
 
-/// What the vision thread can be asked for.
+/// Requests to the vision thread.
 #[derive(Debug, Clone)]
 pub enum VisionTask {
-    /// What to look for, from the next image on. A capture of another board is given up.
+    /// What to look for, from the next image on. A capture of another board is cancelled.
     SetTarget(TargetSpec),
     /// The camera, for the pose of the board in live images.
     SetIntrinsics(Intrinsics),
-    /// Take a capture. One that is under way is given up.
+    /// Take a capture. One that is under way is cancelled.
     Capture(CaptureRequest),
     /// Give up the capture that is under way.
     CancelCapture,

@@ -9,7 +9,8 @@ use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::TargetSpec;
 use image::GrayImage;
 
-use crate::model::{LiveDetection, LiveFrame};
+use crate::capture::state::LiveDetection;
+use crate::live::state::LiveFrame;
 
 /// What is looked for, and the lens.
 #[derive(Debug, Default)]

@@ -10,21 +10,20 @@
 //! A gross fault is accused when it brings the board together at least three times better, and to within a twentieth
 //! of its distance. The others are fitted with noise levels of their own and judged by the F test with allowance for the
 //! number of alternatives, by a size that matters, and, where they change the model, by views held out. The errors of an arm whose
-//! joints are known ([`ArmFit`](crate::ArmFit)), else those of the robot that depend on where it stands
-//! ([`PoseDependentError`](crate::handeye::joint::PoseDependentError)), are part of every fit. What is accepted becomes a finding. Nothing is ever
-//! applied.
+//! joints are known ([`ArmFit`](crate::ArmFit)), else the pose-dependent errors of the robot
+//! ([`PoseDependentError`](crate::handeye::joint::PoseDependentError)), are part of every fit. What is accepted becomes a finding.
+//! Nothing is ever applied.
 //!
 //! # Needs
 //! Four views for gross faults and five for the others, with robot turns about two axes; where that is missing
-//! [`Diagnosis::untested`] says so, and the findings say what is. Views out of the fit count for nothing. Of more than
-//! [`MOST_VIEWS`] views so many are examined, spread over the session.
+//! [`Diagnosis::untested`] says so, and the findings state what is missing. Views out of the fit count for nothing. Of
+//! more than [`MOST_VIEWS`] views only that many are examined, spread over the session.
 
 mod effect;
 mod gross;
 mod judge;
 mod model;
 mod pairing;
-mod report;
 mod screen;
 mod select;
 mod stated_uncertainty;
@@ -32,10 +31,8 @@ pub mod views;
 mod weight;
 mod words;
 
-use serde::Serialize;
-
 use crate::diagnose::Calibration;
-use crate::diagnose::findings::{self, Evidence, Finding, FindingCode, FindingOptions, Severity};
+use crate::diagnose::findings::{self, Finding, FindingCode, FindingOptions, Severity};
 use crate::diagnose::hypotheses::NEED;
 use crate::diagnose::promise;
 use crate::reach_error::Reach;
@@ -43,86 +40,11 @@ use crate::stated_uncertainty::StatedUncertainty;
 use crate::{Fit, Observations};
 use handeye_geometry::progress::Work;
 use handeye_geometry::targets::observation;
-use handeye_wording::Text;
 
-pub use report::Detail;
+pub use crate::diagnose::diagnosis::{Diagnosis, Estimate, Hypothesis};
+pub use crate::diagnose::report::Detail;
 
-/// A hypothesis about the data.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Hypothesis {
-    /// What it says.
-    pub code: FindingCode,
-    /// What it says besides, when several things have to be changed together, or what explains the data just as well
-    /// (inverted poses and the other mode are the same equations).
-    pub with: Vec<FindingCode>,
-    /// It in words, with what it explains.
-    #[serde(serialize_with = "Text::serialize_english")]
-    pub text: Text,
-    /// What to do if it is true.
-    #[serde(serialize_with = "Text::serialize_english")]
-    pub advice: Text,
-    /// Natural logarithm of how many times better it explains the data than they are explained without it; negative when
-    /// it explains them worse.
-    pub gain: f64,
-    /// What it estimates, and one standard deviation.
-    pub estimate: Option<Estimate>,
-    /// The numbers behind it.
-    pub evidence: Vec<Evidence>,
-    /// The views concerned, by name; for a move the first view after it.
-    pub views: Vec<String>,
-    /// Whether chance is ruled out.
-    pub significant: bool,
-    /// Whether it is also large enough to matter, better on views held out, and not explained by one that explains more.
-    /// It is then among the findings.
-    pub accepted: bool,
-    /// Whether the calibration counts on it: a bend or a size that was estimated, views that are left out.
-    pub applied: bool,
-}
-
-impl Hypothesis {
-    /// It in words, with what to do.
-    fn text_with_advice(&self) -> Text {
-        Text::sentences([self.text.clone(), self.advice.clone()])
-    }
-}
-
-/// A number that a hypothesis estimates.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Estimate {
-    /// Name of the quantity, as the JSON has it.
-    pub name: &'static str,
-    /// The estimate, in `unit`.
-    pub value: f64,
-    /// One standard deviation; `None` where none is known.
-    pub sigma: Option<f64>,
-    /// Its unit; empty for a ratio.
-    pub unit: &'static str,
-}
-
-/// The diagnosis of a session.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Diagnosis {
-    /// Everything found, the most severe first; accepted hypotheses are among them.
-    pub findings: Vec<Finding>,
-    /// What was tested: accepted hypotheses in the order of their weight, then the best of every other kind.
-    pub hypotheses: Vec<Hypothesis>,
-    /// Why hypotheses could not be tested; `None` when they were.
-    pub untested: Option<String>,
-}
-
-impl Diagnosis {
-    /// Whether nothing was found that may spoil the answer.
-    pub fn is_healthy(&self) -> bool {
-        self.untested.is_none() && self.findings.iter().all(|f| f.severity < Severity::Warning)
-    }
-
-    /// The diagnosis as a page of text. It ends with a newline.
-    pub fn report(&self, detail: Detail) -> String {
-        report::text(self, detail)
-    }
-}
-
-/// Views that are examined at the most: the noise levels are then known to a few percent, and more would tell no more.
+/// Largest number of views examined: the noise levels are then known to a few percent, and more would add nothing.
 pub const MOST_VIEWS: usize = 400;
 /// Largest noise of a robot, metres and radians per axis, that is taken for an arm's. Real sets of good arms show 0.2
 /// to 0.5 mm and 0.04° to 0.12°; four times as much has another reason.
@@ -130,7 +52,7 @@ const PLAUSIBLE: (f64, f64) = (2e-3, 8.4e-3);
 /// A misfit beyond this part of the board's distance is beyond the linear model.
 const HOPELESS: f64 = 0.2;
 
-/// What is wrong with observations of which there is no fit, or whose fit does not matter: the hypotheses do not depend on it.
+/// What is wrong with observations without a fit, or whose fit does not matter: the hypotheses do not depend on it.
 ///
 /// `work` is a `&CancelToken`, or a [`Work`]; when it is cancelled [`Diagnosis::untested`] says so.
 pub fn diagnose<'a>(observations: &Observations, options: &FindingOptions<'_>, work: impl Into<Work<'a>>) -> Diagnosis {
@@ -175,8 +97,8 @@ pub(super) fn examined(
 }
 
 impl Diagnosis {
-    /// With what the estimate says. It comes before what was examined, so that what the estimate has already acted upon is reported as
-    /// the estimate says it, and said once.
+    /// Adds what the estimate found. It comes before what was examined, so that what the estimate has already acted upon is
+    /// reported as the estimate states it, and only once.
     fn with(mut self, of_estimate: Vec<Finding>) -> Self {
         self.findings.splice(0..0, of_estimate);
         let mut reported: Vec<FindingCode> = Vec::new();
@@ -192,8 +114,8 @@ impl Diagnosis {
     }
 }
 
-/// The observations with the corners numbered as the calibration found them to be, and where they would be if the target were
-/// printed as drawn; `None` when that changes nothing.
+/// The observations with the corners numbered as found by the calibration, and where they would be if the target were printed
+/// as drawn; `None` when that changes nothing.
 fn as_found(observations: &Observations, calibration: &Fit) -> Option<Observations> {
     let print = calibration.joint.as_ref().and_then(|joint| joint.print.as_ref()).zip(calibration.intrinsics());
     if print.is_none() && calibration.views.iter().all(|view| view.quarter_turns == 0) {
@@ -269,7 +191,7 @@ fn examine(
             h.applied = stated_uncertainty::is_applied(calibration, h);
         }
     }
-    // By an arm that is known what its errors do not explain.
+    // With a known arm, the noise is what its errors do not explain.
     let of_poses = calibration.and_then(|calibration| calibration.joint.as_ref()).map(|joint| joint.noise);
     let noise = arm.map(|arm| arm.noise).or(of_poses);
     if let Some((calibration, stated)) = calibration.zip(stated) {
@@ -279,7 +201,7 @@ fn examine(
     let beside = fine.iter().any(|h| h.accepted && !h.applied);
     // Where nothing else was found that is the noise that the answer states: one report has one number for it.
     let (robot_m, robot_rad) = match noise.filter(|_| !beside) {
-        // What depends on the place of the arm is its error as much as what scatters.
+        // Pose-dependent error is part of the robot's error as much as scatter is.
         Some(noise) => (noise.robot_m.hypot(noise.field_m), noise.robot_rad.hypot(noise.field_rad)),
         None => selection.fit.robot_sigma(),
     };

@@ -4,10 +4,20 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::diagnose::findings::Evidence;
 use crate::diagnose::record::{EvidenceRecord, FindingRecord};
 use handeye_wording::text;
 use handeye_wording::{English, Text};
+
+/// One number that supports a finding.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Evidence {
+    /// Name of the number, as in the JSON.
+    pub name: &'static str,
+    /// The number, in its unit.
+    pub value: f64,
+    /// Its unit; empty for a count or a ratio.
+    pub unit: &'static str,
+}
 
 /// What was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
@@ -32,7 +42,7 @@ pub enum FindingCode {
     PoorCoverage,
     /// The robot poses are inverted: tip from base where base from tip was stated, or the other way round.
     InvertedPoses,
-    /// The camera sits on the other side: eye-in-hand where eye-to-hand was stated, or the other way round.
+    /// The camera is on the other side: eye-in-hand where eye-to-hand was stated, or the other way round.
     WrongMode,
     /// The target's poses are inverted: target from camera where camera from target was stated, or the other way round.
     InvertedTargetPoses,
@@ -70,7 +80,7 @@ pub enum FindingCode {
     UncertaintyWidened,
     /// Robot and corner noise cannot be told apart.
     NoiseUnclear,
-    /// The robot poses contradict the images by more than any arm errs.
+    /// The robot poses contradict the images by more than the errors of any arm.
     InconsistentPoses,
     /// One direction of the answer is known much worse than the others.
     WeakDirection,
@@ -86,21 +96,21 @@ pub enum FindingCode {
     RobotNoise,
     /// The lens model folds back within the image, beyond where the target was seen.
     LensFolds,
-    /// The lens was given and taken as exact, and the answer hangs on it.
+    /// The lens was given and taken as exact, and the answer depends on it.
     LensTakenAsExact,
-    /// The robot's errors depend on where it stands.
+    /// The robot's errors depend on its pose.
     RobotField,
-    /// The points of the target are not where its drawing has them.
+    /// The points of the target are displaced from its drawing.
     PrintErrors,
-    /// The lens does more than its model.
+    /// The lens has a distortion beyond its model.
     ResidualDistortion,
-    /// Depths of the target are not those of where it is.
+    /// Depths of the target do not agree with its pose.
     DepthError,
     /// The closed forms do not agree.
     ClosedFormsDisagree,
-    /// The error that the goal is asked of is below it.
+    /// The error that the goal refers to is below it.
     GoalReached,
-    /// The error that the goal is asked of is above it.
+    /// The error that the goal refers to is above it.
     GoalNotReached,
 }
 
@@ -129,7 +139,7 @@ pub struct Finding {
     pub evidence: Vec<Evidence>,
     /// The views concerned, by name; empty when it concerns the whole set.
     pub views: Vec<String>,
-    /// The finding in words; in documents the English ones.
+    /// The finding in words; in documents in English.
     #[serde(serialize_with = "Text::serialize_english")]
     pub text: Text,
 }
@@ -155,7 +165,7 @@ impl Finding {
         self
     }
 
-    /// As it stands in a document.
+    /// The finding as written in a document.
     pub fn to_record(&self) -> FindingRecord {
         // Both are plain names in snake case.
         let name =
@@ -180,7 +190,7 @@ impl Finding {
     }
 }
 
-/// The names of views for a sentence: all of a few, else the first and how many more.
+/// The names of views for a sentence: all of them if few, else the first and how many more.
 pub(crate) fn listed(names: &[String]) -> Text {
     const SHOWN: usize = 4;
     let shown = Text::list(names.iter().take(SHOWN).map(Text::verbatim));

@@ -1,7 +1,7 @@
 //! What is wrong or weak in a set of views and its calibration, and what to do next.
 //!
 //! A finding is data first: a code, a severity, numbers with units and the views concerned; as text, in any language, it
-//! says what it is, by which evidence, and what to do. Residuals say how well the model fits, and are never given as
+//! states what it is, by which evidence, and what to do. Residuals show how well the model fits, and are never given as
 //! accuracy; where a finding speaks of the expected error it is the one stated by the covariance.
 //!
 //! Before a calibration only the views themselves are judged; with one, also the answer.
@@ -9,7 +9,7 @@
 mod answer;
 mod depth;
 mod direction;
-mod finding;
+pub(crate) mod finding;
 mod given_lens;
 pub(crate) mod outliers;
 mod shared_lens;
@@ -17,25 +17,13 @@ mod views;
 
 pub use depth::finding as depth_finding;
 pub(crate) use finding::listed;
-pub use finding::{Finding, FindingCode, Severity};
+pub use finding::{Evidence, Finding, FindingCode, Severity};
 pub use outliers::WIDENING_WORTH_SAYING;
-use serde::Serialize;
 
 use crate::Observations;
 use crate::diagnose::Calibration;
 use crate::placement::ArmOfViews;
 use crate::robot_accuracy::RobotAccuracy;
-
-/// One number that supports a finding.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Evidence {
-    /// Name of the number, as the JSON has it.
-    pub name: &'static str,
-    /// The number, in its unit.
-    pub value: f64,
-    /// Its unit; empty for a count or a ratio.
-    pub unit: &'static str,
-}
 
 /// What the user wants, and has.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -1,6 +1,6 @@
 //! Effects that displace the corners of all views, linear in many small coefficients: their equations, and their level.
 //!
-//! What a lens does beyond its model is one ([`super::residual_distortion`]), and what a print is off its drawing another
+//! The residual distortion of a lens is one ([`super::residual_distortion`]), and print errors of a target are another
 //! ([`super::print_errors`]). The coefficients `c` are random effects. All other unknowns are eliminated from the normal
 //! equations of an optimum, so that the cost as a function of `c` is `cᵀ S c − 2 hᵀ c`. Where they are independent with one
 //! standard deviation `s`, with the eigenvalues `a_k` of `S` and `h` in its axes, twice the logarithm of the restricted
@@ -18,8 +18,9 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector, Matrix6xX};
 
 use super::normal::{Reduced, System};
+use super::pose_part::whitened;
 use super::state::State;
-use super::view_block::{Layout, Own, PixelWeights, ViewBlock, prior_weight, whitened};
+use super::view_block::{Layout, Own, PixelWeights, ViewBlock, prior_weight};
 use super::{JointProblem, JointSolution, Noise};
 use crate::handeye::HandEyeError;
 use crate::intrinsics::evidence::Score;
@@ -32,13 +33,13 @@ use handeye_geometry::view_equations::{MAX_FORM, POSE, Pair, Rows, ViewInput, Wh
 /// 276 simulated sessions that gain enough by a residual distortion none was missed, and nine in ten spectra of healthy ones
 /// were spared.
 const NEARLY: f64 = 0.4;
-/// Factor from one standard deviation that is tried to the next.
+/// Factor between the standard deviations that are tried.
 const FACTOR: f64 = 1.1;
-/// Information below this part of the largest counts as none: a direction known a hundred times worse than the best says
-/// nothing of a field of a pixel, and where lens and poses take one up, rounding leaves 2e-5 of the largest on recorded sets.
+/// Information below this part of the largest counts as zero: a direction known a hundred times worse than the best does not
+/// determine a field of a pixel, and where lens and poses absorb one, rounding leaves 2e-5 of the largest on recorded sets.
 const UNSEEN: f64 = 1e-4;
 
-/// What displaces the corners.
+/// An effect that displaces the corners.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effect {
     /// Polynomials up to a degree over the image, first those of the displacement along x, pixels.
@@ -48,7 +49,7 @@ pub enum Effect {
 }
 
 impl Effect {
-    /// Number of coefficients, on a target of so many points.
+    /// Number of coefficients, on a target with this many points.
     fn count(self, points: usize) -> usize {
         2 * match self {
             Self::Distortion(degree) => functions(degree),
@@ -60,18 +61,18 @@ impl Effect {
 /// The normal equations of the coefficients once all else is eliminated.
 #[derive(Clone)]
 pub struct Equations {
-    /// Of the coefficients.
+    /// Information matrix of the coefficients.
     pub information: DMatrix<f64>,
-    /// At coefficients of zero: the right side.
+    /// The right side at coefficients of zero.
     pub pull: DVector<f64>,
     /// How the shared unknowns follow the coefficients, with the opposite sign.
     pub follow: DMatrix<f64>,
-    /// Residuals less the unknowns of the views and of the lens.
+    /// Number of residuals less the unknowns of the views and of the lens.
     pub residuals: f64,
 }
 
-/// What a view says of the shared unknowns and, behind them, of the coefficients of effects, its correction eliminated. `None` where
-/// the view says nothing.
+/// Score of a view in the shared unknowns and, behind them, the coefficients of effects, with its correction eliminated. `None`
+/// where the view has no information.
 pub fn score(
     problem: &JointProblem<'_>,
     state: &State,
@@ -106,12 +107,13 @@ pub struct MostLikely {
     pub level: f64,
     pub gain: f64,
     pub coefficients: DVector<f64>,
-    /// Trace of what the coefficients take up.
+    /// Degrees of freedom that the coefficients use up.
     pub freedom: f64,
 }
 
 impl Equations {
-    /// Of the coefficients of an effect, at an optimum; `None` where there are too few residuals for it to be shown.
+    /// Equations of the coefficients of an effect, at an optimum; `None` where there are too few residuals for it to be
+    /// shown.
     pub fn new(
         problem: &JointProblem<'_>,
         solution: &JointSolution,
@@ -153,7 +155,7 @@ impl Equations {
         Self { information, pull: -gradient, follow, residuals }
     }
 
-    /// Of the coefficients `x` with `c = B x`.
+    /// The equations of the coefficients `x` with `c = B x`.
     pub fn along(&self, by: &DMatrix<f64>) -> Self {
         let information = by.tr_mul(&(&self.information * by));
         Self {
@@ -176,27 +178,27 @@ impl Equations {
         }
     }
 
-    /// The same where an effect with these coefficients was taken off before.
+    /// The same where an effect with these coefficients was subtracted before.
     pub fn beyond(mut self, coefficients: &DVector<f64>) -> Self {
         self.pull += &self.information * coefficients;
         self
     }
 
-    /// The same for corners of another noise.
+    /// The same for corners with another noise level.
     pub fn times(mut self, factor: f64) -> Self {
         self.information *= factor;
         self.pull *= factor;
         self
     }
 
-    /// Whether the score says that a level may gain as much as `gain`.
+    /// Whether by the score a level may gain as much as `gain`.
     pub fn may_gain(&self, gain: f64) -> bool {
         let score = self.pull.norm_squared() - self.information.trace();
         let spread = (2.0 * self.information.norm_squared()).sqrt();
         score > 0.0 && (score / spread).powi(2) >= NEARLY * gain
     }
 
-    /// Along the axes of the information.
+    /// The equations along the axes of the information.
     pub fn spectrum(&self) -> Spectrum {
         let eigen = self.information.clone().symmetric_eigen();
         let least = UNSEEN * eigen.eigenvalues.max();
@@ -233,7 +235,7 @@ impl Spectrum {
         MostLikely { level, gain, coefficients: self.coefficients(&variances), freedom: self.freedom(&variances) }
     }
 
-    /// Of the coefficients along the axes.
+    /// Variances of the coefficients along the axes.
     pub fn variances(&self, level: f64) -> DVector<f64> {
         self.information.map(|a| (a + level.powi(-2)).recip())
     }
@@ -243,12 +245,12 @@ impl Spectrum {
         &self.axes * self.pull.component_mul(variances)
     }
 
-    /// Trace of what the coefficients take up.
+    /// Degrees of freedom that the coefficients use up.
     pub fn freedom(&self, variances: &DVector<f64>) -> f64 {
         self.information.component_mul(variances).sum()
     }
 
-    /// Length of a way of the coefficients in its standard deviations, squared.
+    /// Squared length of a change of the coefficients in standard deviations.
     pub fn length(&self, way: &DVector<f64>, level: f64) -> f64 {
         let along = self.axes.tr_mul(way);
         along.component_mul(&along).component_div(&self.variances(level)).sum()
@@ -261,7 +263,7 @@ pub fn levels(range: &Range<f64>) -> impl Iterator<Item = f64> {
     std::iter::successors(Some(first), |level| Some(level * FACTOR)).take_while(move |level| *level < end)
 }
 
-/// How a corner turns with where its point is on the target as drawn, by how it turns with the pose: but for the scale the same.
+/// Jacobian of a corner by the place of its point on the target as drawn, from that by the pose: the same except for the scale.
 fn by_point(by_pose: Pair, seen: &ViewInput<'_>) -> Pair {
     by_pose.map(|value| value * seen.shape.scale)
 }
@@ -275,14 +277,14 @@ struct Products {
 }
 
 impl Products {
-    /// Of several effects, one behind the other; `None` where a corner has no image.
+    /// Products of several effects, one behind the other; `None` where a corner has no image.
     fn new(problem: &JointProblem<'_>, state: &State, index: usize, effects: &[Effect]) -> Option<Self> {
         let view = &problem.views[index];
         let chain = state.chain(problem, view, &state.corrections[index]);
         let whitener = problem.whitener(view);
         let seen = problem.seen(state, view, &whitener);
         let rows = Rows::new(&seen, &chain.camera_from_target, problem.free.form());
-        // Where the corners of the view do not err independently every column takes up all rows.
+        // Where the errors of the corners of the view are not independent every column covers all rows.
         let apart = !matches!(whitener, Whitener::Together { .. });
         let (by, own) = match effects {
             [Effect::Distortion(degree)] if apart => of_distortion(&seen, &rows, *degree),
@@ -303,7 +305,7 @@ impl Products {
 /// Inner products of the columns of coefficients with those of the pose, those of the form and the residual, and with each other.
 type OfColumns = (DMatrix<f64>, DMatrix<f64>);
 
-/// Of any effects, one behind the other.
+/// Products of any effects, one behind the other.
 fn of_all_rows(seen: &ViewInput<'_>, rows: &Rows<'_>, effects: &[Effect]) -> Option<OfColumns> {
     let size = (seen.intrinsics.width, seen.intrinsics.height);
     let points = seen.board.len();
@@ -358,7 +360,7 @@ fn of_distortion(seen: &ViewInput<'_>, rows: &Rows<'_>, degree: usize) -> Option
     let transposed = functions.transpose();
     let weighed = |weights: &[f64]| DMatrix::from_fn(f, n, |i, j| functions[(i, j)] * weights[j]) * &transposed;
     let xx = weighed(&weights[0]);
-    // Corners that count alike have the same weight along both axes, and none between them.
+    // Corners with equal weights have the same weight along both axes, and none between them.
     let (xy, yy) = if matches!(seen.whitener, Whitener::Alike) {
         (DMatrix::zeros(f, f), xx.clone())
     } else {
@@ -376,7 +378,7 @@ fn of_distortion(seen: &ViewInput<'_>, rows: &Rows<'_>, degree: usize) -> Option
     Some((by, own))
 }
 
-/// A corner turns with its own point alone.
+/// Products of the print alone: a corner depends only on its own point.
 fn of_print(seen: &ViewInput<'_>, rows: &Rows<'_>) -> Option<OfColumns> {
     let n = seen.board.len();
     let columns = POSE + rows.count + 1;
@@ -400,7 +402,7 @@ fn of_print(seen: &ViewInput<'_>, rows: &Rows<'_>) -> Option<OfColumns> {
     Some((by, own))
 }
 
-/// That of the print first.
+/// Products of print and distortion, the print first.
 fn of_print_and_distortion(seen: &ViewInput<'_>, rows: &Rows<'_>, degree: usize) -> Option<OfColumns> {
     let ((by_print, of_print), (by_distortion, of_distortion)) =
         (of_print(seen, rows)?, of_distortion(seen, rows, degree)?);
@@ -428,7 +430,7 @@ fn of_print_and_distortion(seen: &ViewInput<'_>, rows: &Rows<'_>, degree: usize)
     Some((by, own))
 }
 
-/// By which the residual of a corner that has a weight of its own counts.
+/// Weight matrix of the residual of a corner with its own weight.
 fn whitening(seen: &ViewInput<'_>, corner: usize) -> [[f64; 2]; 2] {
     seen.whitener.of(corner).map_or([[1.0, 0.0], [0.0, 1.0]], |w| [[w.m11, w.m12], [w.m21, w.m22]])
 }
@@ -437,7 +439,7 @@ fn whitening(seen: &ViewInput<'_>, corner: usize) -> [[f64; 2]; 2] {
 struct Sums {
     information: DMatrix<f64>,
     gradient: DVector<f64>,
-    /// Between shared unknowns and coefficients.
+    /// Products of shared unknowns and coefficients.
     cross: DMatrix<f64>,
 }
 
@@ -446,7 +448,7 @@ impl Sums {
     fn add(&mut self, products: &Products, block: &ViewBlock, own: &Own, noise: &Noise) {
         let weights = PixelWeights::new(noise);
         let excess = weights.pose - weights.rest;
-        // As the residuals are, what the coefficients do is split into what a pose could explain and the rest.
+        // Like the residuals, the effect of the coefficients is split into what a pose could explain and the rest.
         let of_pose = whitened(&block.root(), products.by_pose.clone());
         self.information += &products.own * weights.rest + of_pose.tr_mul(&of_pose) * excess;
         self.gradient += &products.by_residual * weights.rest + of_pose.tr_mul(&block.residual) * excess;

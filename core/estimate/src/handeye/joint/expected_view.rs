@@ -1,11 +1,11 @@
-//! What a view that was not taken is expected to say, by the model of a finished calibration.
+//! The information expected from a view that was not taken, by the model of a finished calibration.
 //!
 //! With the corners of a view linearised at the estimate, its pixel residuals are split into the six numbers that a pose of
 //! its own could explain and the rest ([`super::view_block`]). The six are
 //! `z = A s + A_d d + e` in units of their own noise, with the unknowns `s` that all views share, the error `d` of the
-//! robot and white noise `e`. With `d ~ N(0, Σ)` they say `Aᵀ (1 + A_d Σ A_dᵀ)⁻¹ A` about `s`; the rest says
-//! `F / corner_px²` about lens and shape. Both are kept as rows `R` with `Rᵀ R` the information, so that a view is a change
-//! of low rank.
+//! robot and white noise `e`. With `d ~ N(0, Σ)` their information on `s` is `Aᵀ (1 + A_d Σ A_dᵀ)⁻¹ A`; that of the rest on
+//! lens and shape is `F / corner_px²`. Both are kept as rows `R` with `Rᵀ R` the information, so that a view is a change of
+//! low rank.
 
 use nalgebra::{Cholesky, DMatrix, Isometry3, Matrix6, Vector2, Vector6};
 
@@ -13,8 +13,9 @@ use super::arm_errors::{ArmErrors, KINDS};
 use super::chain::Chain;
 use super::expected_pixels::ExpectedPixels;
 use super::pose_dependent_error::PoseDependentError;
+use super::pose_part::whitened;
 use super::variance::levels_of_effects;
-use super::view_block::{Layout, PixelWeights, ViewBlock, prior_weight, whitened};
+use super::view_block::{Layout, PixelWeights, ViewBlock, prior_weight};
 use super::{Free, Noise, SIZE_SIGMA};
 use crate::Fit;
 use crate::arm_fit::BesideArm;
@@ -30,7 +31,7 @@ use handeye_geometry::view_equations::{PoseEquations, ViewInput, Whitener};
 /// Part of its largest diagonal entry below which a pivot is rounding.
 const NO_PIVOT: f64 = 1e-12;
 
-/// How the robot stands in a view.
+/// The robot's posture in a view.
 #[derive(Debug, Clone)]
 pub struct Posture {
     /// Tip pose as the controller reports it.
@@ -40,13 +41,13 @@ pub struct Posture {
 }
 
 impl From<Pose<Base, Tip>> for Posture {
-    /// Its joints are not known.
+    /// A posture whose joints are not known.
     fn from(base_from_tip: Pose<Base, Tip>) -> Self {
         Self { base_from_tip, tip_from_joints: Vec::new() }
     }
 }
 
-/// The model that a calibration ended with: what its views share, and how noisy they are.
+/// The model that a calibration ended with: the unknowns that its views share, and their noise.
 #[derive(Debug, Clone)]
 pub struct ViewModel {
     hand_eye: HandEye,
@@ -62,7 +63,7 @@ pub struct ViewModel {
     layout: Layout,
 }
 
-/// What a view says of the unknowns that all views share.
+/// The information of a view on the unknowns that all views share.
 #[derive(Debug, Clone)]
 pub struct ExpectedView {
     /// `R`, with the information `Rᵀ R`; a column per unknown.
@@ -70,7 +71,7 @@ pub struct ExpectedView {
 }
 
 impl ViewModel {
-    /// That of a joint estimate with a robot and a camera; `None` for any other calibration.
+    /// The model of a joint estimate with a robot and a camera; `None` for any other calibration.
     pub fn new(calibration: &Fit, target: &TargetSpec) -> Option<Self> {
         let joint = calibration.joint.as_ref()?;
         let lens = joint.known_lens;
@@ -96,7 +97,7 @@ impl ViewModel {
         })
     }
 
-    /// The same with the errors of the arm among the unknowns; `None` where the calibration does not know them, see [`Fit::arm`].
+    /// The same with the errors of the arm among the unknowns; `None` where the calibration does not have them, see [`Fit::arm`].
     pub fn of_arm(calibration: &Fit, target: &TargetSpec) -> Option<Self> {
         let arm = calibration.arm()?;
         let BesideArm { intrinsics, shape, free, .. } = arm.beside.clone();
@@ -117,7 +118,7 @@ impl ViewModel {
         })
     }
 
-    /// Of links and lens that are known, with a flat target and a robot whose errors do not depend on where it stands.
+    /// The model of links and lens that are known, with a flat target and a robot without pose-dependent errors.
     pub fn known(
         hand_eye: HandEye,
         intrinsics: Intrinsics,
@@ -153,7 +154,7 @@ impl ViewModel {
         &self.noise
     }
 
-    /// Where the camera sits.
+    /// Where the camera is mounted.
     pub fn mode(&self) -> Mode {
         self.hand_eye.mode()
     }
@@ -183,8 +184,8 @@ impl ViewModel {
         self.layout.count()
     }
 
-    /// What is known of the unknowns without any view: of the slopes of the robot's field and of the errors of the arm their levels; of the rest so
-    /// little that any few views know more, and enough that every question has an answer.
+    /// What is known of the unknowns without any view: for the slopes of the robot's field and the errors of the arm their levels;
+    /// for the rest so little that any few views determine more, but enough that every matrix is regular.
     pub fn prior(&self) -> DMatrix<f64> {
         let mut sigma = vec![1.0; self.unknowns()];
         if self.free.intrinsics {
@@ -215,7 +216,7 @@ impl ViewModel {
     /// not determine a pose, or are not in front of the camera.
     fn block(&self, posture: &Posture, corners: &[usize]) -> Option<ViewBlock> {
         let chain = self.chain(posture);
-        // Where the corners were found does not matter to what they say.
+        // Where the corners were found does not matter for their information.
         let corners: Vec<Corner> = corners.iter().map(|&index| Corner::new(index, Vector2::zeros())).collect();
         let seen = ViewInput {
             intrinsics: &self.intrinsics,
@@ -244,13 +245,13 @@ impl ViewModel {
         Pose::from_isometry(self.chain(posture).camera_from_target)
     }
 
-    /// From where the robot would see the target so, without its field and the errors of its arm.
+    /// The tip pose at which the target would be seen like this, without its field and the errors of its arm.
     pub fn base_from_tip(&self, camera_from_target: &Pose<Camera, Target>) -> Pose<Base, Tip> {
         self.hand_eye.base_from_tip(camera_from_target)
     }
 
-    /// What a view says in which the corners with these indices are found; `None` where they do not determine a pose or are not in
-    /// front of the camera. One whose joints are not known says nothing of the errors of the arm.
+    /// The information of a view in which the corners with these indices are found; `None` where they do not determine a pose or
+    /// are not in front of the camera. A view whose joints are not known has no information on the errors of the arm.
     pub fn expected(&self, posture: &Posture, corners: &[usize]) -> Option<ExpectedView> {
         let block = self.block(posture, corners)?;
         let weights = PixelWeights::new(&self.noise);
@@ -282,20 +283,20 @@ impl ExpectedView {
         &self.rows
     }
 
-    /// What it says of the unknowns, their inverse covariance.
+    /// Its information on the unknowns, an inverse covariance.
     pub fn information(&self) -> DMatrix<f64> {
         self.rows.tr_mul(&self.rows)
     }
 }
 
-/// `R` with `Rᵀ R` a matrix that is positive but for rounding, without the rows that say nothing.
+/// `R` with `Rᵀ R` a matrix that is positive semidefinite except for rounding, without the rows that are zero.
 fn half_root(mut matrix: DMatrix<f64>) -> DMatrix<f64> {
     let n = matrix.nrows();
     let scale: Vec<f64> = (0..n).map(|i| matrix[(i, i)].max(0.0)).collect();
     let mut rows: Vec<nalgebra::RowDVector<f64>> = Vec::with_capacity(n);
     for i in 0..n {
         let pivot = matrix[(i, i)];
-        // A direction that those before it know already, or that nothing is known of.
+        // A direction that the ones before already determine, or without any information.
         if pivot <= NO_PIVOT * scale[i] || pivot <= 0.0 {
             continue;
         }

@@ -7,17 +7,17 @@
 //!
 //! # Model
 //! Corner `j` of view `i`: `px_ij = project(camera_from_target_i * point_j) + noise`, noise independent and Gaussian
-//! with `corner_px` per axis; where the data ask for it, the part of a view's noise that looks like a pose is larger
-//! (`view_px`). The chain is `camera_from_target_i = mount_from_camera⁻¹ * mount_from_anchor_i *
-//! anchor_from_target`. The true tip pose is `base_from_tip_i * E_i`, where `E_i` has translation `rho_i` and rotation
-//! `exp(phi_i)`; both are Gaussian with `robot_m` and `robot_rad` per axis. Without `E_i` the answer would be worse
-//! than a closed form on any real robot, because a tenth of a degree moves a corner by far more than its own noise.
+//! with `corner_px` per axis; where the data require it, the part of a view's noise that looks like a pose is larger
+//! (`view_px`). The chain is `camera_from_target_i = mount_from_camera⁻¹ * mount_from_anchor_i * anchor_from_target`.
+//! The true tip pose is `base_from_tip_i * E_i`, where `E_i` has translation `rho_i` and rotation `exp(phi_i)`; both
+//! are Gaussian with `robot_m` and `robot_rad` per axis. Without `E_i` the answer would be worse than a closed form on
+//! any real robot, because a tenth of a degree moves a corner by far more than its own noise.
 //!
 //! # How
 //! Levenberg–Marquardt with analytic Jacobians; the corrections are eliminated view by view (Schur complement), so the
 //! cost grows linearly with the number of views. The noise levels maximise the restricted likelihood (REML) of the
-//! linearised model ([`variance`]); both steps alternate until the levels stand still. What estimated levels do to the
-//! covariance is in [`integrated`], and what a cost does that is no parabola in [`curvature`].
+//! linearised model ([`variance`]); both steps alternate until the levels converge. The effect of estimated levels on
+//! the covariance is in [`integrated`], that of a cost that is not quadratic in [`curvature`].
 //!
 //! # Reference
 //! Triggs et al. 2000, "Bundle adjustment — a modern synthesis", §6; Patterson & Thompson 1971, "Recovery of
@@ -36,6 +36,7 @@ pub(crate) mod normal;
 pub(crate) mod optimise;
 pub mod outliers;
 pub(crate) mod pose_dependent_error;
+pub(crate) mod pose_part;
 pub mod prediction;
 pub(crate) mod print_errors;
 mod problem;
@@ -85,7 +86,7 @@ use optimise::Descent;
 use state::State;
 use variance::{Levels, Logs, to_logs};
 
-/// Rounds of weights and optimum at the most.
+/// Most rounds of weights and optimum.
 const MAX_ROUNDS: usize = 20;
 /// Relative change of every noise level below which the rounds end: a thousandth moves the answer by far less than its
 /// uncertainty.
@@ -95,8 +96,8 @@ const ROUND_TOLERANCE: f64 = 1e-3;
 /// the progress too.
 ///
 /// # Needs
-/// Three views with robot rotations about two axes (check with [`super::motion`] before), every view with at least
-/// four corners. `start` within the basin of convergence: any closed form on PnP poses is.
+/// Three views with robot rotations about two axes (check with [`super::motion`] first), every view with at least four
+/// corners. `start` within the basin of convergence: any closed form on PnP poses is.
 ///
 /// # Errors
 /// [`HandEyeError::TooFewViews`], [`HandEyeError::NoSolution`] when the normal equations are singular or the start puts
@@ -111,7 +112,8 @@ pub fn estimate<'a>(
     with_stated_error(problem, solution, work.cancel)
 }
 
-/// The same without what estimated noise levels and a curved cost do to the covariance: for fits whose answer alone counts.
+/// The same without the effect of estimated noise levels and a curved cost on the covariance: for fits of which only the
+/// answer is used.
 pub(crate) fn fit<'a>(
     problem: &JointProblem<'_>,
     start: &JointStart,
@@ -155,7 +157,7 @@ pub(crate) fn fit<'a>(
         let mut settled = variance::change(&noise, &next) < ROUND_TOLERANCE;
         let lifted = variance::lifted(&system, &next, levels)?;
         if settled && lifted != variance::kept(to_logs(&next), levels) {
-            // A level that vanished far from the optimum would stay so at it.
+            // A level that vanished far from the optimum would stay zero at it.
             let (found, larger) = most_likely(&lifted, levels)?;
             if likelihood - larger > ANOTHER_TOP {
                 (next, likelihood, settled) = (found, larger, false);
@@ -175,7 +177,7 @@ pub(crate) fn fit<'a>(
         }
     }
     if levels.view && noise.view_px < NO_VIEW_NOISE * noise.corner_px {
-        // It was asked for on the way and is not needed at the end.
+        // It was needed on the way and is not at the end.
         noise.view_px = 0.0;
     }
     let descent = Descent { problem, noise: &noise, damping: optimise::NEAR };
@@ -184,18 +186,18 @@ pub(crate) fn fit<'a>(
     Ok(JointSolution { iterations: iterations + steps, deviance, ..solution })
 }
 
-/// Gain of minus twice the log-likelihood from which levels found from elsewhere are another maximum of it, and not the same
-/// by a shorter way.
+/// Gain of minus twice the log-likelihood from which levels found from another start are another maximum of it, not the same
+/// one reached more closely.
 const ANOTHER_TOP: f64 = 1e-3;
 
-/// Noise of the view below this part of a corner's noise is none: it adds less than three parts in a thousand to the variance
-/// of a pose.
+/// Noise of the view below this part of a corner's noise counts as zero: it adds less than three parts in a thousand to the
+/// variance of a pose.
 const NO_VIEW_NOISE: f64 = 0.05;
 
 /// Gain of minus twice the log-likelihood from which a noise that all corners of a view share is taken into the model: by
-/// chance one session in a thousand. The level is at the edge of what it can be, so half of all healthy sessions gain
-/// nothing and the rest follows chi-square with one degree of freedom (Self & Liang 1987). Robot errors that neighbouring
-/// poses share can look like it and gain up to nine in sessions of fifteen views.
+/// chance one session in a thousand. The level is at the edge of its range, so half of all healthy sessions gain nothing
+/// and the rest follows chi-square with one degree of freedom (Self & Liang 1987). Robot errors that neighbouring poses
+/// share can look like it and gain up to nine in sessions of fifteen views.
 const VIEW_NOISE_GAIN: f64 = 9.55;
 
 /// A solution of [`fit`] with the covariance that may be stated.

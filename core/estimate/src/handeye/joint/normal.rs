@@ -2,8 +2,9 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Point3, Vector6};
 
+use super::pose_part::Rest;
 use super::variance::levels_of_effects;
-use super::view_block::{Layout, Own, PixelWeights, Rest, ViewBlock, add_rest, add_square, columns, prior_weight};
+use super::view_block::{Layout, Own, PixelWeights, ViewBlock, add_rest, add_square, columns, prior_weight};
 use super::{DepthWeight, JointProblem, Noise, SIZE_SIGMA};
 use crate::handeye::HandEyeError;
 use crate::handeye::joint::state::State;
@@ -38,18 +39,18 @@ pub struct System {
     pub blocks: Vec<ViewBlock>,
     pub corrections: Vec<Vector6<f64>>,
     pub layout: Layout,
-    /// Of all but the lens, and the effects whose priors are their levels.
+    /// Priors of all unknowns but the lens and the effects, whose priors are their levels.
     priors: Vec<SharedPrior>,
     known_lens: Option<PriorOfLens>,
     /// Slopes of the field and errors of the arm, as they are now.
     pub effects: Vec<f64>,
     /// Sum of `Jsᵀ Js` over the poses' parts of the views, upper triangle.
     shared: DMatrix<f64>,
-    /// Sum of `Jsᵀ r` likewise.
+    /// Sum of `Jsᵀ r` over the same parts.
     shared_gradient: DVector<f64>,
     /// Sum of the rests of the views.
     rest: Rest,
-    /// Polled at every view by whatever loops over them.
+    /// Polled at every view by loops over them.
     pub cancel: CancelToken,
 }
 
@@ -94,7 +95,7 @@ impl System {
         (squares.max(0.0), self.rest.form.dot(&covariance.view((at, at), (f, f))))
     }
 
-    /// What the rests of the views say of the form, for corners of a noise of one pixel.
+    /// Information of the rests of the views on the form, for corners with a noise of one pixel.
     pub fn rest_information(&self) -> &DMatrix<f64> {
         &self.rest.form
     }
@@ -122,7 +123,7 @@ impl System {
         self.priors.iter().copied().chain(of_effects)
     }
 
-    /// The cost of what is known beforehand of the shared unknowns, after a step of them.
+    /// The cost of the priors of the shared unknowns, after a step of them.
     pub fn prior_cost(&self, noise: &Noise, step: Option<&DVector<f64>>) -> f64 {
         let single = self.known(noise).map(|p| p.precision * (p.offset + step.map_or(0.0, |s| s[p.index])).powi(2));
         let of_lens = self.known_lens.as_ref().map_or(0.0, |known| {
@@ -135,7 +136,7 @@ impl System {
         single.sum::<f64>() + of_lens
     }
 
-    /// What is known beforehand, as an information matrix.
+    /// The priors, as an information matrix.
     pub fn prior_information(&self, noise: &Noise) -> DMatrix<f64> {
         let n = self.layout.count();
         let mut known = DMatrix::zeros(n, n);
@@ -207,13 +208,13 @@ impl System {
     }
 }
 
-/// Standard deviations of offset, scale and slope of a depth camera before any data: metres, a part, pixels. They are no knowledge,
-/// but where the board is always as far away its distance tells no offset from a scale.
+/// Standard deviations of offset, scale and slope of a depth camera before any data: metres, a part, pixels. They are not prior
+/// knowledge, but where the board is always at the same distance, offset and scale cannot be separated.
 const DEPTH_PRIOR: [f64; 3] = [0.1, 0.1, 3.0];
 
 fn priors(problem: &JointProblem<'_>, state: &State) -> Vec<SharedPrior> {
     let depth_at = Layout::FORM_AT + problem.free.form().depth_at(&state.intrinsics);
-    // Where the depths do not count nothing tells the tilt.
+    // Where the depths do not count nothing determines the tilt.
     let tilt = problem.depth.map_or(1.0, DepthWeight::tilt_sigma_rad);
     let sigmas = DEPTH_PRIOR.into_iter().chain([tilt; 2]);
     let depth = state.depth.values().into_iter().zip(sigmas).enumerate().map(|(k, (offset, sigma))| SharedPrior {
@@ -221,7 +222,7 @@ fn priors(problem: &JointProblem<'_>, state: &State) -> Vec<SharedPrior> {
         offset,
         precision: sigma.powi(-2),
     });
-    // A print is known no better than printers and rulers are, and an arm tells its size as well as it tells its own.
+    // A print is known no better than printers and rulers are, and an arm determines its size only as well as its own.
     let scale = (problem.free.arm && problem.free.scale).then(|| SharedPrior {
         index: Layout::FORM_AT + problem.free.form().scale_at(&state.intrinsics),
         offset: state.shape.scale - 1.0,
@@ -267,13 +268,13 @@ fn scaled_cholesky(matrix: &DMatrix<f64>) -> Option<(Cholesky<f64, Dyn>, DVector
     Some((cholesky(matrix, &scale)?, scale))
 }
 
-/// Columns differ by many orders (metres, radians, lens coefficients); scaled, the pivots say what is singular.
+/// Columns differ by many orders (metres, radians, lens coefficients); scaled, the pivots show what is singular.
 fn cholesky(matrix: &DMatrix<f64>, scale: &DVector<f64>) -> Option<Cholesky<f64, Dyn>> {
     let scaled = DMatrix::from_fn(scale.len(), scale.len(), |i, j| matrix[(i, j)] * scale[i] * scale[j]);
     Cholesky::new(scaled).filter(|f| f.l_dirty().diagonal().iter().all(|p| *p > SINGULAR_PIVOT))
 }
 
-/// The inverse of what was scaled, as the square of that of its factor: every column of `L⁻ᵀ` adds to the entries that it
+/// The inverse of the unscaled matrix, from the inverse of its factor: every column of `L⁻ᵀ` adds to the entries that it
 /// has.
 fn scaled_inverse(factor: &Cholesky<f64, Dyn>, scale: &DVector<f64>) -> DMatrix<f64> {
     let upper = factor.l_dirty().transpose();
@@ -309,7 +310,7 @@ pub fn covariance_of(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 
 /// The system in the shared unknowns alone.
 pub struct Reduced {
-    /// Of the shared unknowns.
+    /// Information matrix of the shared unknowns.
     pub information: DMatrix<f64>,
     factor: Cholesky<f64, Dyn>,
     scale: DVector<f64>,
@@ -333,7 +334,7 @@ impl Reduced {
         -self.solve(&self.gradient)
     }
 
-    /// The step of every correction that goes with a shared step.
+    /// The step of every correction that belongs to a shared step.
     pub fn own_steps(&self, shared_step: &DVector<f64>) -> Vec<Vector6<f64>> {
         self.own.iter().map(|own| own.step(shared_step)).collect()
     }

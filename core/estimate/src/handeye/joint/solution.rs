@@ -1,4 +1,4 @@
-//! What the joint estimate finds.
+//! Result of the joint estimate.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -12,24 +12,25 @@ use crate::handeye::joint::normal::System;
 use crate::handeye::joint::pose_dependent_error::{PoseDependentError, corrected_base_from_tip};
 use crate::handeye::joint::problem::{Free, JointStart, Noise};
 use crate::handeye::{HandEye, HandEyeError};
-use crate::uncertainty::overdispersion::{self, Overdispersion};
+use crate::uncertainty::overdispersion::widening::{Overdispersion, with_less_known};
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_geometry::targets::bent::BoardShape;
 use handeye_geometry::targets::observation::View;
 use handeye_geometry::view_equations::DepthBias;
 
-/// What happened to one view.
+/// Result for one view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ViewFit {
     /// RMS of its 2-D corner residuals with the robot pose corrected, pixels.
     pub rms_px: f64,
-    /// Correction of the reported tip pose beyond that of the field: translation \[m\] and rotation vector \[rad\] in the tip frame.
+    /// Correction of the reported tip pose beyond that of the field: translation \[m\] and rotation vector \[rad\] in the tip
+    /// frame.
     pub correction: Vector6<f64>,
     /// The target's pose by the chain with the robot pose corrected.
     pub camera_from_target: Pose<Camera, Target>,
-    /// How far the camera point [`JointSolution::reference_point`] moves when this view is left out, metres, to first
-    /// order; `None` when the rest does not determine an answer, and before the error is stated.
+    /// Distance by which the camera point [`JointSolution::reference_point`] moves when this view is left out, metres,
+    /// to first order; `None` when the rest does not determine an answer, and before the error is stated.
     pub influence_m: Option<f64>,
 }
 
@@ -46,13 +47,13 @@ pub struct JointSolution {
     pub depth: DepthBias,
     /// Errors of the robot's arm; `None` when they were not estimated.
     pub arm: Option<ArmErrors>,
-    /// Errors of the robot that depend on where it stands; `None` when they were not estimated.
+    /// Pose-dependent errors of the robot; `None` when they were not estimated.
     pub field: Option<PoseDependentError>,
     /// Minus twice the log of the restricted likelihood of the noise levels; `None` when these were given.
     pub deviance: Option<f64>,
     /// Covariance of `[mount_from_camera (6), anchor_from_target (6), free intrinsics…, free warps, free scale, errors of
-    /// depths, slopes of the field, errors of the arm]`, metres, radians, pixels; right perturbations. It includes the robot's noise
-    /// and the uncertainty of every other unknown, that of estimated noise levels too.
+    /// depths, slopes of the field, errors of the arm]`, metres, radians, pixels; right perturbations. It includes the robot's
+    /// noise and the uncertainty of every other unknown, including estimated noise levels.
     pub covariance: DMatrix<f64>,
     /// How the error of the hand-eye transform is distributed in units of its covariance.
     pub small_sample: SmallSample,
@@ -125,7 +126,7 @@ impl JointSolution {
     /// Multiplies the covariance, and that of a free lens with what rests on it, because the data show that they are too small.
     pub fn widen(&mut self, widening: &Overdispersion) {
         if widening.lens > 1.0 {
-            self.covariance = overdispersion::with_less_known(&self.covariance, self.lens_places(), widening.lens);
+            self.covariance = with_less_known(&self.covariance, self.lens_places(), widening.lens);
         }
         self.covariance *= widening.factor;
     }
@@ -140,7 +141,7 @@ impl JointSolution {
         corrected_base_from_tip(view, self.arm.as_ref(), self.field.as_ref())
     }
 
-    /// Where the iteration ended, to start another from.
+    /// The end of the iteration as the start of another.
     pub fn as_start(&self) -> JointStart {
         JointStart {
             mount_from_camera: self.hand_eye.mount_from_camera(),

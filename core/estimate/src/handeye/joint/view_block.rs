@@ -12,10 +12,11 @@ use super::Noise;
 use super::arm_errors::KINDS;
 use super::chain::Chain;
 use super::pose_dependent_error::PoseDependentError;
+use super::pose_part::{PosePart, Rest, forward, split};
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_geometry::view_equations::PoseEquations;
 
-/// Where which shared unknown is.
+/// Places of the shared unknowns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
     /// Number of unknowns of lens and target shape.
@@ -26,8 +27,8 @@ pub struct Layout {
     pub arm: [usize; KINDS],
 }
 
-/// Kinds of random effects, each with a level of its own: slopes of the field's position and orientation, and what can be off about
-/// an arm.
+/// Kinds of random effects, each with a level of its own: slopes of the field's position and orientation, and the kinds of errors
+/// of an arm.
 pub const EFFECTS: usize = 2 + KINDS;
 
 impl Layout {
@@ -68,9 +69,9 @@ impl Layout {
 /// Weights of the two parts of a view's residuals: inverse variances, per squared pixel.
 #[derive(Debug, Clone, Copy)]
 pub struct PixelWeights {
-    /// Of the six numbers that a pose of the view could explain.
+    /// Weight of the six numbers that a pose of the view could explain.
     pub pose: f64,
-    /// Of all others.
+    /// Weight of all others.
     pub rest: f64,
 }
 
@@ -86,87 +87,33 @@ pub fn prior_weight(noise: &Noise) -> Vector6<f64> {
     Vector6::new(t, t, t, r, r, r)
 }
 
-/// What remains of a view's residuals once its own pose has taken up what it can: a matter of the form alone.
-#[derive(Debug, Clone)]
-pub struct Rest {
-    /// `Jfᵀ Jf − Jfᵀ Jp (Jpᵀ Jp)⁻¹ Jpᵀ Jf`
-    pub form: DMatrix<f64>,
-    /// `Jfᵀ r` less the pose's part.
-    pub gradient: DVector<f64>,
-    /// `rᵀ r` less the pose's part, squared pixels.
-    pub squared_px: f64,
-}
-
-impl Rest {
-    /// Of no view, with so many unknowns of the form.
-    pub fn nothing(form: usize) -> Self {
-        Self { form: DMatrix::zeros(form, form), gradient: DVector::zeros(form), squared_px: 0.0 }
-    }
-
-    /// Adds that of another view.
-    pub fn add(&mut self, other: &Self) {
-        self.form += &other.form;
-        self.gradient += &other.gradient;
-        self.squared_px += other.squared_px;
-    }
-}
-
-/// The six numbers of a view that a pose of it could explain, with `L Lᵀ = Jpᵀ Jp`.
-pub struct PosePart {
-    /// `L`
-    pub root: Matrix6<f64>,
-    /// `L⁻¹ Jpᵀ Jf`
-    pub by_form: Matrix6xX<f64>,
-    /// `L⁻¹ Jpᵀ r`, pixels.
-    pub residual: Vector6<f64>,
-}
-
-/// What a pose of the view could explain, and the rest; `None` when the corners of the view determine no pose.
-pub fn split(equations: &PoseEquations) -> Option<(PosePart, Rest)> {
-    let root = Cholesky::new(equations.pose)?.l();
-    let by_form = whitened(&root, equations.pose_by_form.clone());
-    let mut residual = equations.pose_gradient;
-    forward(&root, residual.as_mut_slice());
-    let rest = Rest {
-        form: &equations.form - by_form.tr_mul(&by_form),
-        gradient: &equations.form_gradient - by_form.tr_mul(&residual),
-        squared_px: (equations.squared_px - residual.norm_squared()).max(0.0),
-    };
-    Some((PosePart { root, by_form, residual }, rest))
-}
-
-/// Columns times the inverse of a lower factor.
-pub fn whitened(root: &Matrix6<f64>, mut columns: Matrix6xX<f64>) -> Matrix6xX<f64> {
-    columns.as_mut_slice().chunks_exact_mut(6).for_each(|column| forward(root, column));
-    columns
-}
-
 /// One view, linearised: `r` are its pixel residuals, `s` the shared unknowns, `d` its correction, `p` its own pose.
 ///
 /// The residuals are split into the six numbers that a pose of the view could explain and the rest, because errors that
-/// all corners of a view share (lens, shape of the target, blur, light) look like a pose and weigh more than `n` corners
-/// that err independently would say. All members but [`Self::rest`] are of the six, `z = L⁻¹ Jpᵀ r` with `L Lᵀ = Jpᵀ Jp`.
+/// all corners of a view share (lens, shape of the target, blur, light) look like a pose and weigh more than with `n`
+/// corners of independent errors. All members but [`Self::rest`] are those of the six, `z = L⁻¹ Jpᵀ r` with
+/// `L Lᵀ = Jpᵀ Jp`.
 ///
 /// A fit of ten thousand views has as many of these, so nothing is kept that follows from the rest of it.
 #[derive(Debug, Clone)]
 pub struct ViewBlock {
     /// `z`, pixels.
     pub residual: Vector6<f64>,
-    /// How `z` turns with the shared unknowns, a row for each.
+    /// Derivatives of `z` by the shared unknowns, a row for each.
     pub by_shared: MatrixXx6<f64>,
-    /// How `z` turns with the correction.
+    /// Jacobian of `z` with respect to the correction.
     pub by_correction: Matrix6<f64>,
     /// `Jdᵀ Jd`
     pub own: Matrix6<f64>,
     pub rest: Rest,
     pub corners: usize,
-    /// Residuals of depths.
+    /// Number of residuals of depths.
     pub depths: usize,
 }
 
 impl ViewBlock {
-    /// `None` when the corners of the view determine no pose. `field` is that of the robot and the reported pose, if there is one that
-    /// belongs to no arm.
+    /// `None` when the corners of the view determine no pose. `field` is that of the robot and the reported pose, if there is one
+    /// that is not part of an arm's errors.
     pub fn new(
         chain: &Chain,
         equations: &PoseEquations,
@@ -228,8 +175,8 @@ impl ViewBlock {
         self.by_shared.tr_mul(step).norm_squared() + of_form.dot(&(&self.rest.form * of_form))
     }
 
-    /// What the view says about the shared unknowns once its correction is eliminated, and the gradient that goes with it
-    /// at a correction; `None` when the correction is undetermined.
+    /// The information of the view on the shared unknowns once its correction is eliminated, and the gradient that goes
+    /// with it at a correction; `None` when the correction is undetermined.
     pub fn information(&self, noise: &Noise, correction: &Vector6<f64>) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let weights = PixelWeights::new(noise);
         let own = Own::new(self, correction, weights.pose, &prior_weight(noise), 0.0)?;
@@ -304,13 +251,13 @@ impl Own {
         Some(Self { factor, whitened: times(&block.by_shared, &by.transpose()), whitened_gradient: gradient })
     }
 
-    /// Takes from the upper triangle and the gradient of the shared unknowns what the correction takes up.
+    /// Subtracts from the upper triangle and the gradient of the shared unknowns what the correction absorbs.
     pub fn take_from(&self, matrix: &mut DMatrix<f64>, gradient: &mut DVector<f64>) {
         add_square(matrix, columns(&self.whitened), -1.0);
         gradient.gemv(-1.0, &self.whitened, &self.whitened_gradient, 1.0);
     }
 
-    /// The step of the correction that goes with a shared step.
+    /// The step of the correction that belongs to a shared step.
     pub fn step(&self, shared: &DVector<f64>) -> Vector6<f64> {
         let mut out = -(self.whitened_gradient + self.whitened.tr_mul(shared));
         backward(self.factor.l_dirty(), out.as_mut_slice());
@@ -354,7 +301,7 @@ fn times(tall: &MatrixXx6<f64>, small: &Matrix6<f64>) -> MatrixXx6<f64> {
     product
 }
 
-/// Takes a multiple of one column off another.
+/// Subtracts a multiple of one column from another.
 fn take(to: &mut [f64], from: &[f64], factor: f64) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to -= factor * from);
 }
@@ -362,17 +309,6 @@ fn take(to: &mut [f64], from: &[f64], factor: f64) {
 fn scale(column: &mut [f64], factor: f64) {
     for value in column {
         *value *= factor;
-    }
-}
-
-/// Solves `L x = v` in place.
-fn forward(l: &Matrix6<f64>, v: &mut [f64]) {
-    for i in 0..6 {
-        let mut sum = v[i];
-        for j in 0..i {
-            sum -= l[(i, j)] * v[j];
-        }
-        v[i] = sum / l[(i, i)];
     }
 }
 

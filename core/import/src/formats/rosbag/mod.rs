@@ -1,5 +1,5 @@
-//! Bags of ROS 2, in MCAP or SQLite, and of ROS 1: images where the robot stood still, its poses from the tree of frames or from
-//! messages of poses, joint values, cameras.
+//! Bags of ROS 2, in MCAP or SQLite, and of ROS 1: images at which the robot was at rest, its poses from the tree of frames or
+//! from pose messages, joint values, cameras.
 //!
 //! Frames of the tree are composed by the stamps of their transforms; an instant is at rest when nothing that moves in the bag
 //! moves around it. Of each rest one image is taken. Where there are too few rests, images of the moving robot are, with their
@@ -21,19 +21,19 @@ use nalgebra::Isometry3;
 use super::{Encoding, File, Format, joints, tree};
 use crate::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
 use crate::folder;
-use crate::reader::Reader;
+use crate::formats::reader::Reader;
 use crate::recording::{JointSeries, Known, Numbers, Recording, Role, Sample, Stated, Track};
 use contents::{Bag, Timed, nearest};
 use handeye_files::budget::Budget;
 use handeye_wording::Text;
 use handeye_wording::text;
 
-/// Half of the time around an instant in which nothing may move.
+/// Half of the time around an instant without motion.
 const REST_NS: i64 = 250_000_000;
-/// What counts as no motion: metres, radians (and metres of prismatic joints).
+/// What counts as no motion: metres, radians (or metres for prismatic joints).
 const STILL_M: f64 = 5e-4;
 const STILL_RAD: f64 = 2e-3;
-/// Rests with which views can be told apart: with fewer the motion between them says more.
+/// Number of rests that give enough views: with fewer the motion between them gives more information.
 const ENOUGH_RESTS: usize = 6;
 /// Most images that are taken out of a bag.
 const MOST_IMAGES: usize = 1000;
@@ -67,13 +67,13 @@ fn folder_of(file: &Path) -> &Path {
     file.parent().unwrap_or(Path::new(""))
 }
 
-/// The files of every bag: those of ROS 2 with its description beside them are one, compressed or not; others are each a bag.
+/// The files of every bag: those of ROS 2 with a description file are one, compressed or not; others are each a bag.
 fn bags<'a>(files: &'a [File], root: &Path) -> Vec<Vec<&'a Path>> {
     let has_description =
         |file: &Path| folder::ending(file) != "bag" && root.join(folder_of(file)).join("metadata.yaml").is_file();
     let mut bags: Vec<Vec<&Path>> = Vec::new();
     for file in files.iter().map(|file| file.path.as_path()) {
-        // Whoever plays a compressed bag leaves its files unpacked beside it.
+        // Playing a compressed bag leaves its unpacked files next to it.
         if folder::ending(file) == "zstd" && files.iter().any(|other| other.path == file.with_extension("")) {
             continue;
         }
@@ -91,7 +91,7 @@ fn bags<'a>(files: &'a [File], root: &Path) -> Vec<Vec<&'a Path>> {
 /// Takes what a bag has into a recording; `parts` are its files in order.
 ///
 /// # Errors
-/// A sentence, where it is no bag, its images cannot be unpacked or the budget is spent.
+/// A sentence, where it is not a bag, its images cannot be unpacked or the budget is spent.
 fn read(file: &str, parts: &[PathBuf], budget: &Budget<'_>, recording: &mut Recording) -> Result<(), Text> {
     let (parts, _scratch) = storage::plain_parts(parts, budget)?;
     let bag = Bag::read(&parts, budget)?;
@@ -154,7 +154,7 @@ fn read(file: &str, parts: &[PathBuf], budget: &Budget<'_>, recording: &mut Reco
     Ok(())
 }
 
-/// Of every rest the image in its middle; of the first rests where the budget is spent.
+/// The image in the middle of every rest; only of the first rests when the budget is spent.
 fn rests(bag: &Bag, stamps: &[i64], budget: &Budget<'_>) -> Vec<i64> {
     let mut out = Vec::new();
     let mut rest: Vec<i64> = Vec::new();
@@ -186,7 +186,7 @@ fn tracks(bag: &Bag, file: &str, topic: &str, stamps: &[i64]) -> Vec<Track> {
         let poses: Vec<_> = stamps.iter().map(|stamp| nearest(moving, *stamp, REST_NS).copied()).collect();
         let why = format!("poses on {name}, taken to be of the tip in the base");
         let mut track = track(bag, file, topic, name, stamps, &poses, &why);
-        // A message of a pose does not say which way it is meant.
+        // A pose message does not state its direction.
         if let Some(track) = &mut track {
             track.stated.direction = None;
             track.role = tree::role(name);
@@ -210,7 +210,7 @@ fn joints(bag: &Bag, file: &str, topic: &str, stamps: &[i64]) -> Vec<JointSeries
     bag.joints.iter().filter_map(of).collect()
 }
 
-/// Where a message stands.
+/// The place of a message.
 fn place(file: &str, name: &str, stamp_ns: i64) -> Text {
     let seconds = format!("{:.3}", stamp_ns as f64 * 1e-9);
     text!("{file}, {name} at {seconds} s", file = file, name = name, seconds = seconds)
@@ -225,7 +225,7 @@ fn track(
     poses: &[Option<Isometry3<f64>>],
     why: &str,
 ) -> Option<Track> {
-    // Of an arm, and not of the gripper that may be heard beside it.
+    // Joint values of an arm, and not of the gripper that may be published as well.
     let arm = bag.joints.values().max_by_key(|values| values.first().map_or(0, |(_, joints)| joints.len()));
     let sample = |(stamp, pose): (&i64, &Option<Isometry3<f64>>)| {
         let pose = (*pose)?;

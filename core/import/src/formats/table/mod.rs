@@ -10,8 +10,8 @@ use std::sync::Arc;
 
 use super::tree::is_image_name;
 use super::{Encoding, File, Format, blocks, joints, tree};
-use crate::nothing::Likely;
-use crate::reader::Reader;
+use crate::formats::nothing::Likely;
+use crate::formats::reader::Reader;
 use crate::recording::{JointSeries, Numbers, Sample, Track};
 use crate::value::number;
 use cells::Line;
@@ -77,7 +77,7 @@ fn instead(text: &str) -> (Likely, Text) {
     (Likely::Numbers, why.with("rows", rows).with("width", width))
 }
 
-/// The series of poses in a text, which may be none.
+/// The series of poses in a text, if there are any.
 fn read(file: &str, text: &str) -> Vec<Track> {
     let lines = cells::lines(text);
     let groups = labels::groups(&lines).unwrap_or_default();
@@ -99,7 +99,7 @@ fn of_lines(file: &str, lines: &[Line]) -> Vec<Track> {
     if let Some(tracks) = header::with_header(file, lines) {
         return tracks;
     }
-    // Six joint values are no pose.
+    // Six joint values are not a pose.
     if header::joints(file, lines).is_some() {
         return Vec::new();
     }
@@ -137,7 +137,7 @@ fn sample(
     Sample { image, number, place: Arc::new(place(file, line)), numbers, joints }
 }
 
-/// Where a row stands.
+/// The place of a row.
 fn place(file: &str, line: &Line) -> Text {
     text!("{file}, row {row}", file = file, row = line.row)
 }

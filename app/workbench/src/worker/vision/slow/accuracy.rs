@@ -9,8 +9,8 @@ use handeye_coppeliasim::{CancelToken, MotionLimits};
 use handeye_dataset::taught_poses::{Goal, TaughtPoses};
 
 use crate::capture;
+use crate::capture::state::{CaptureWait, RefusalKind};
 use crate::command::Event;
-use crate::model::{CaptureWait, RefusalKind};
 use crate::worker::vision::VisionTask;
 use crate::worker::vision::bench::{CellBench, request};
 
@@ -136,7 +136,7 @@ fn every_live_image_is_judged_and_a_paused_simulation_is_named() {
     }
     let hits: Vec<_> = bench.live(20);
     assert!(hits.iter().all(|detection| detection.camera_from_target.is_some()));
-    let ms = |detections: &[crate::model::LiveDetection]| {
+    let ms = |detections: &[crate::capture::state::LiveDetection]| {
         let mut all: Vec<f64> = detections.iter().map(|detection| detection.took_s * 1e3).collect();
         all.sort_by(f64::total_cmp);
         all[all.len() / 2]

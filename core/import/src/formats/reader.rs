@@ -1,24 +1,24 @@
-//! Reads the files of a recording: opens each as its name and its beginning say, and offers it to every format.
+//! Reads the files of a recording: opens each according to its name and its beginning, and offers it to every format.
 
 use std::path::{Path, PathBuf};
 
-use super::folder;
-use super::formats::tree::LEAST_POSES;
-use super::formats::{ALL, Content, Encoding, File, Format, of_ending};
-use super::recording::{FoundMode, Recording, Stream};
-use super::value::{self, Value};
-use super::xml;
+use super::tree::LEAST_POSES;
+use super::{ALL, Content, Encoding, File, Format, of_ending};
+use crate::folder;
+use crate::recording::{FoundMode, Recording, Stream};
+use crate::value::{self, Value};
+use crate::xml;
 use handeye_files::budget::Budget;
 use handeye_wording::Text;
 use handeye_wording::text;
 
-/// Files of text that are read at the most.
+/// Most text files that are read.
 const MOST_DOCUMENTS: usize = 5000;
-/// Lines of a table, a program or a report: ten times as many poses as are taken by hand or by a robot in a day, or as many rows as
-/// a robot that is asked a hundred times a second writes in half an hour.
+/// Lines of a table, a program or a report: ten times as many poses as are taken by hand or by a robot in a day, or the rows of
+/// half an hour at 100 Hz.
 const MOST_LINES: usize = 200_000;
 
-pub(super) struct Reader<'a> {
+pub(crate) struct Reader<'a> {
     pub root: &'a Path,
     pub recording: Recording,
     pub budget: &'a Budget<'a>,
@@ -102,7 +102,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// What lies beside a file that was named: cameras and targets, and no series.
+    /// Reads the files next to a named file: for cameras and targets, but not for series.
     pub fn companions(&mut self, files: &[PathBuf]) {
         let Recording { tracks, joints, rows, .. } = &self.recording;
         let (tracks, joints, rows) = (tracks.len(), joints.len(), rows.len());
@@ -114,7 +114,7 @@ impl<'a> Reader<'a> {
         self.recording.rows.truncate(rows);
     }
 
-    /// The images in folders below that a file which was named says: it was named alone, and what lies around it was not looked at.
+    /// The images in the folders below that a named file lists: for a named file, the folder around it is not searched.
     pub fn named_images(&mut self) {
         let names = self.recording.tracks.iter().flat_map(|track| &track.samples).filter_map(|it| it.image.as_deref());
         let files = folder::images_below(self.root, names, &self.recording.bounds, self.budget);
@@ -124,7 +124,7 @@ impl<'a> Reader<'a> {
         self.recording.streams.extend(streams);
     }
 
-    /// Takes where the camera sits. Two files that say different things leave it open.
+    /// Takes the place of the camera. Two files that disagree leave it open.
     pub fn mode(&mut self, mode: FoundMode) {
         match &self.recording.mode {
             Some(known) if known.value != mode.value => {
@@ -181,7 +181,7 @@ fn document(text: &str) -> Option<Value> {
     if text.starts_with('<') {
         return xml::opencv(text);
     }
-    // What else begins with a brace, as frames of KRL, is no JSON; lists of numbers are tables.
+    // Other texts that begin with a brace, for example frames of KRL, are not JSON; lists of numbers are tables.
     let inner = text.strip_prefix('[').unwrap_or(text).trim_start();
     if inner.starts_with('{') { value::json(text).ok() } else { None }
 }

@@ -2,11 +2,10 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use super::worker::ControlTask;
-use crate::motion::desk::MotionQueue;
-use crate::motion::grip::Grip;
-use crate::worker::channels::{Counter, Requests};
-use crate::worker::{Clock, Request};
+use super::desk::MotionQueue;
+use super::grip::Grip;
+use crate::worker::channels::Counter;
+use crate::worker::shared::Clock;
 
 /// Stops the arm from any thread. Nothing in here waits: a stop is a count that the control worker looks at before anything
 /// else, and it takes precedence until the arm has been stopped, over every connection and every cell.
@@ -27,8 +26,8 @@ pub struct StopLine {
 pub struct Ends {
     /// The motions that wait.
     pub desk: Arc<MotionQueue>,
-    /// The thread that controls the simulation.
-    pub control: Requests<Request<ControlTask>>,
+    /// Wakes the thread that controls the simulation, without waiting for it.
+    pub wake_control: Box<dyn Fn() + Send + Sync>,
     /// The time of the window.
     pub clock: Clock,
 }
@@ -44,8 +43,7 @@ impl StopLine {
         self.stops.ask();
         if let Some(ends) = self.ends().as_ref() {
             ends.desk.cancel((ends.clock)());
-            // Only to wake a resting worker: one that is too busy to take it checks the stop line by itself.
-            let _full = ends.control.ask(Request::Do(ControlTask::CheckStop)).is_err();
+            (ends.wake_control)();
         }
     }
 
@@ -74,7 +72,7 @@ impl StopLine {
         self.outside.finish(number);
     }
 
-    /// Whether a stop is asked for and not done.
+    /// Whether a stop is requested and not done.
     pub fn is_pressed(&self) -> bool {
         self.wanted().is_some()
     }

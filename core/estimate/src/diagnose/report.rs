@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::{Diagnosis, Hypothesis};
-use crate::diagnose::findings::{Finding, FindingCode, Severity};
+use super::diagnosis::{Diagnosis, Hypothesis};
+use super::findings::finding::{Finding, FindingCode, Severity};
 use handeye_wording::English;
 
 /// Writing into a `String` cannot fail.
@@ -13,12 +13,12 @@ macro_rules! line {
     }};
 }
 
-/// How much of a diagnosis a page says.
+/// How much of a diagnosis a page shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Detail {
     /// What was found, and in a line what was checked and found fine.
     Found,
-    /// And every hypothesis with what it explains.
+    /// Also every hypothesis with what it explains.
     All,
 }
 
@@ -79,7 +79,7 @@ fn hypothesis(out: &mut String, number: usize, h: &Hypothesis) {
     line!(out, "  {number}. [{}] {verdict}: {}", code(h.code), h.text.in_language(English));
 }
 
-/// What a hypothesis is about, for a list of what was looked at.
+/// What a hypothesis is about, for a list of what was checked.
 fn checked(code: FindingCode) -> &'static str {
     use FindingCode as C;
     match code {
@@ -100,7 +100,7 @@ fn checked(code: FindingCode) -> &'static str {
     }
 }
 
-/// The code as it stands in JSON.
+/// The code as written in JSON.
 fn code(code: FindingCode) -> String {
     // A unit variant is always a string.
     serde_json::to_value(code).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()

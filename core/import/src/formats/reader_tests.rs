@@ -21,7 +21,7 @@ fn file(name: &str, text: impl Into<String>) -> (String, String) {
     (name.to_owned(), text.into())
 }
 
-/// The series that are no other reading of one, by name.
+/// The series that are not another reading of one, by name.
 fn tracks(recording: &Recording) -> Vec<&Track> {
     recording.tracks.iter().filter(|track| track.reading_of.is_none()).collect()
 }

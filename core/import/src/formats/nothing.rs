@@ -1,22 +1,22 @@
-//! What is said of a recording in which no series of poses was found: what its files have instead, and what to do.
+//! The report for a recording without a series of poses: what its files contain instead, and what to do.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::folder;
-use super::formats::{Content, Encoding, File, of_ending};
 use super::reader::{Reader, content};
+use super::{Content, Encoding, File, of_ending};
+use crate::folder;
 use handeye_wording::Text;
 use handeye_wording::text;
 
-/// Files of text that are told of.
+/// Most text files that are reported.
 const MOST_REPORTED: usize = 5;
-/// Groups of files among which those are looked for, and the bytes of one: a person waits for the answer.
+/// Most groups of files that are searched for those, and most bytes of one: the user waits for the answer.
 const MOST_LOOKED_AT: usize = 200;
 const LARGEST: u64 = 1 << 20;
 
 /// Why nothing came of each of the files that are likeliest to have poses, and what to do with those that are not read.
-pub(super) fn reasons(reader: &Reader<'_>, files: &[PathBuf]) -> Vec<Text> {
+pub(crate) fn reasons(reader: &Reader<'_>, files: &[PathBuf]) -> Vec<Text> {
     let mut stated: Vec<(Likely, Text)> = Vec::new();
     for members in folder::groups(files, true).iter().take(MOST_LOOKED_AT) {
         let Some((first, _)) = members.first().filter(|_| !reader.budget.is_spent()) else { continue };
@@ -33,15 +33,15 @@ pub(super) fn reasons(reader: &Reader<'_>, files: &[PathBuf]) -> Vec<Text> {
     reasons
 }
 
-/// How likely a file was meant.
+/// How likely a file was meant as poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Likely {
+pub(crate) enum Likely {
     Poses,
     Numbers,
     Neither,
 }
 
-/// What to do with a file of a format that is not read.
+/// Advice for a file of a format that is not read.
 fn not_read(file: &Path) -> Option<Text> {
     Some(match folder::ending(file).as_str() {
         "mat" => text!("files of MATLAB (.mat) are not read: save the poses as csv, npz or json"),
@@ -55,7 +55,7 @@ fn not_read(file: &Path) -> Option<Text> {
     })
 }
 
-/// What a file has in place of a series; `None` of one that is of no format with poses.
+/// What a file has in place of a series; `None` for one that is not of a format with poses.
 fn reason(file: &Path, reader: &Reader<'_>) -> Option<(Likely, Text)> {
     let path = reader.root.join(file);
     let is_small = std::fs::metadata(&path).is_ok_and(|found| found.len() <= LARGEST);
