@@ -2,6 +2,7 @@
 //!
 //! `slow` is what the fast tier (`./test fast`) skips: real-time sequences, desktops, browsers, the long fuzz.
 
+mod circles;
 mod command_line;
 mod documents;
 mod exports;

@@ -12,7 +12,8 @@ use serde_json::Value;
 const TRUTH: [&str; 3] = ["GroundTruth", "ground_truth", "TruthComparison"];
 
 /// Crates whose sources produce an estimate.
-const ESTIMATING: [&str; 9] = ["arm", "capture", "detect", "estimate", "files", "geometry", "import", "plan", "track"];
+const ESTIMATING: [&str; 10] =
+    ["arm", "capture", "detect", "estimate", "files", "geometry", "import", "pairs", "plan", "track"];
 
 /// Limit of crates in a program that only estimates, itself included.
 const MOST_CRATES: usize = 60;
