@@ -11,7 +11,7 @@ use handeye_wording::text;
 #[derive(Debug, Default)]
 pub struct Late {
     since: Option<Instant>,
-    is_said: bool,
+    is_reported: bool,
 }
 
 /// How long images may be late \[s\] without a report: a slow camera has intervals of this length.
@@ -24,7 +24,7 @@ impl Late {
     /// Once there has been none for [`NO_IMAGES_S`].
     pub fn waits(&mut self, now: Instant) -> Result<(), PortError> {
         let since_s = now.saturating_duration_since(*self.since.get_or_insert(now)).as_secs_f64();
-        if since_s > UNSAID_S && !std::mem::replace(&mut self.is_said, true) {
+        if since_s > UNSAID_S && !std::mem::replace(&mut self.is_reported, true) {
             tracing::warn!("an image is late, and the next one is waited for");
         }
         if since_s <= NO_IMAGES_S {

@@ -141,7 +141,7 @@ pub fn main() -> ExitCode {
             // An error contains what was typed, or what a pattern of the shell expanded to.
             let words = error.render().to_string();
             if out::shown(&words) == words {
-                let _said = error.print().is_ok();
+                let _written = error.print().is_ok();
             } else {
                 out::note(words.trim_end());
             }

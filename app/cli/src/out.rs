@@ -103,7 +103,7 @@ pub fn finished(written: io::Result<()>, place: impl Display) -> Result<(), Fail
 
 /// Writes one line for the user to standard error. A failure cannot be reported anywhere.
 pub fn note(line: impl Display) {
-    let _said = Log { is_coloured: false }.write_all(format!("{line}\n").as_bytes()).is_ok();
+    let _written = Log { is_coloured: false }.write_all(format!("{line}\n").as_bytes()).is_ok();
 }
 
 /// Standard error for lines that must not stop the work: it accepts all of them.
@@ -117,7 +117,7 @@ impl Write for Log {
     fn write(&mut self, line: &[u8]) -> io::Result<usize> {
         let text = String::from_utf8_lossy(line);
         let shown = if self.is_coloured { coloured(&text) } else { shown(&text) };
-        let _said = io::stderr().lock().write_all(shown.as_bytes()).is_ok();
+        let _written = io::stderr().lock().write_all(shown.as_bytes()).is_ok();
         Ok(line.len())
     }
 

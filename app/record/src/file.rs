@@ -11,7 +11,7 @@ pub const MAX_LIVE_BYTES: u64 = 512 * 1024 * 1024;
 ///
 /// # Errors
 /// When none can be created there.
-pub fn create_beside(folder: &Path) -> io::Result<PathBuf> {
+pub fn create_next_to(folder: &Path) -> io::Result<PathBuf> {
     let mut number = 1;
     loop {
         let name = if number == 1 { "recording.rrd".to_owned() } else { format!("recording-{number}.rrd") };
@@ -44,11 +44,11 @@ mod tests {
     #[test]
     fn an_earlier_recording_is_never_overwritten() {
         let folder = tempfile::tempdir().expect("a folder");
-        let first = create_beside(folder.path()).expect("a file");
+        let first = create_next_to(folder.path()).expect("a file");
         fs::write(&first, "something").expect("written");
-        let second = create_beside(folder.path()).expect("a file");
+        let second = create_next_to(folder.path()).expect("a file");
         assert_eq!(second.file_name().and_then(|name| name.to_str()), Some("recording-2.rrd"));
         assert_eq!((size(&first), size(&second)), (9, 0));
-        assert!(create_beside(&folder.path().join("none")).is_err());
+        assert!(create_next_to(&folder.path().join("none")).is_err());
     }
 }

@@ -66,11 +66,11 @@ impl Reports {
 
     /// Something for the user.
     pub fn notice(&self, severity: Severity, text: Text) {
-        self.tell(messages::Event::Notice { severity, text });
+        self.report(messages::Event::Notice { severity, text });
     }
 
     /// Something that has happened.
-    pub fn tell(&self, event: impl Into<Event>) {
+    pub fn report(&self, event: impl Into<Event>) {
         let event = event.into();
         let mut inner = self.inner();
         if inner.events.len() < MAX_EVENTS {

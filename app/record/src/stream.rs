@@ -122,7 +122,7 @@ impl Stream {
                 // Recordings with a session are stored here.
                 let folder =
                     recording.folder.as_deref().ok_or_else(|| std::io::Error::from(std::io::ErrorKind::NotFound))?;
-                let path = file::create_beside(folder)?;
+                let path = file::create_next_to(folder)?;
                 let stream = stream(recording, file_sink(&path)?, FILE_TICK, true)?;
                 (stream.clone(), stream, Some(path))
             }

@@ -148,7 +148,7 @@ impl Shared {
             };
             self.reports.notice(Severity::Info, text);
             if !opened {
-                self.reports.tell(recording::Event::NoBrowser);
+                self.reports.report(recording::Event::NoBrowser);
             }
         }
         Ok(())

@@ -97,7 +97,7 @@ impl Pieces {
     /// Reports that the rest does not come.
     pub fn fail(&self, error: io::Error) {
         // The receiver may be gone.
-        let _told = self.to.blocking_send(Err(error)).is_ok();
+        let _sent = self.to.blocking_send(Err(error)).is_ok();
     }
 }
 

@@ -279,7 +279,7 @@ impl Host {
             let next = self.reported + TELL;
             if Instant::now() >= next {
                 self.reported = Instant::now();
-                self.hub.tell(reading::controls(update));
+                self.hub.send_controls(reading::controls(update));
             } else {
                 sooner(&self.due, next.saturating_duration_since(Instant::now()));
             }

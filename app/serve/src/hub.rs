@@ -332,7 +332,7 @@ impl Hub {
     }
 
     /// Updates the controls for screen readers.
-    pub fn tell(&self, controls: Vec<Control>) {
+    pub fn send_controls(&self, controls: Vec<Control>) {
         self.controls.send_if_modified(|before| {
             let is_new = **before != *controls;
             if is_new {

@@ -121,8 +121,8 @@ fn what_an_error_misses_or_wants_is_there_in_chinese() {
     let mut missing = Vec::new();
     for (file, source) in all_sources() {
         let path = file.to_string_lossy().replace('\\', "/");
-        let is_said = ["/core/", "/sim_link/coppeliasim/src/"].iter().any(|folder| path.contains(folder));
-        if !is_said || path.contains("tests") {
+        let is_reported = ["/core/", "/sim_link/coppeliasim/src/"].iter().any(|folder| path.contains(folder));
+        if !is_reported || path.contains("tests") {
             continue;
         }
         for field in ["holds: \"", "reason: \"", "want: \"", "needs: \"", "expected: \"", "problem: \""] {

@@ -167,10 +167,10 @@ fn the_two_layouts_of_a_charuco_board_are_told_apart() {
             let printed = TargetSpec::Charuco(charuco(columns, rows, Some(layout)));
             let photo = photo_of(printed, camera(), 0.45, [0.4, 1.0, 0.5], Vector2::zeros());
             let image = photo.render(2);
-            let unsaid = charuco(columns, rows, None);
+            let unstated = charuco(columns, rows, None);
             let what = format!("{columns}×{rows}, {}", layout.name());
-            assert_eq!(right(&found(&image, &TargetSpec::Charuco(unsaid)), &photo, &what), columns * rows);
-            let seen = charuco_layout(&image, &unsaid).expect("searches");
+            assert_eq!(right(&found(&image, &TargetSpec::Charuco(unstated)), &photo, &what), columns * rows);
+            let seen = charuco_layout(&image, &unstated).expect("searches");
             let other = if layout == Layout::New { Layout::Legacy } else { Layout::New };
             let wrong = detect(&image, &TargetSpec::Charuco(charuco(columns, rows, Some(other))));
             if rows % 2 == 0 {

@@ -28,7 +28,7 @@ pub struct ArmFit {
     /// Both rigid links, by corrected tip poses.
     pub hand_eye: HandEye,
     /// What was estimated together with them.
-    pub beside: BesideArm,
+    pub others: OtherEstimates,
     /// Covariance of both links, everything else estimated and, at its end, the errors of the arm, as in
     /// [`JointSolution::covariance`].
     pub covariance: DMatrix<f64>,
@@ -49,7 +49,7 @@ pub struct ArmFit {
 
 /// What was estimated in addition to the errors of an arm and both links.
 #[derive(Debug, Clone)]
-pub struct BesideArm {
+pub struct OtherEstimates {
     /// The lens, estimated or as given.
     pub intrinsics: Intrinsics,
     /// Shape of the target, estimated or as given.
@@ -100,13 +100,13 @@ impl ArmFit {
     /// Standard deviations of the lens that belongs to them, in the order of [`Intrinsics::parameters`]; empty when it was
     /// given.
     pub fn intrinsics_sigma(&self) -> Vec<f64> {
-        let lens = 12..12 + self.beside.free.form().warp_at(&self.beside.intrinsics);
+        let lens = 12..12 + self.others.free.form().warp_at(&self.others.intrinsics);
         lens.map(|i| self.deviation(i)).collect()
     }
 
     /// The shape of the target that belongs to them; `None` when it was given.
     pub fn shape(&self) -> Option<ShapeEstimate> {
-        let BesideArm { intrinsics, shape, free, .. } = &self.beside;
+        let OtherEstimates { intrinsics, shape, free, .. } = &self.others;
         let form = free.form();
         let warp = 12 + form.warp_at(intrinsics);
         let scale_sigma = free.scale.then(|| self.deviation(12 + form.scale_at(intrinsics)));
@@ -209,11 +209,11 @@ pub(crate) fn arm_fit(
     if !is_asked && let Some(covariance) = with_uncertain_size(&fit) {
         fit.covariance = covariance;
     }
-    let beside = BesideArm { intrinsics: fit.intrinsics, shape: fit.shape, depth: fit.depth, free: fit.free };
+    let others = OtherEstimates { intrinsics: fit.intrinsics, shape: fit.shape, depth: fit.depth, free: fit.free };
     Ok(Some(ArmFit {
         errors,
         hand_eye: fit.hand_eye,
-        beside,
+        others,
         covariance: fit.covariance,
         small_sample: fit.small_sample,
         noise: fit.noise,

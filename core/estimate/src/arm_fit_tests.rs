@@ -70,15 +70,15 @@ fn the_error_of_a_camera_on_an_arm_counts_what_the_arm_is_off_and_more_views_are
         (calibration, goal.map(|finding| finding.to_string()).unwrap_or_default())
     };
     let links = OFF_LINKS.map(|row| row.map(|value| 4.0 * value));
-    let ((off, said_of_off), (exact, said_of_exact)) = (of(ArmError::Links(links)), of(ArmError::None));
+    let ((off, stated_off), (exact, stated_exact)) = (of(ArmError::Links(links)), of(ArmError::None));
     let (by_noise, stated) = (off.modelled_error_95_m().expect("joint"), off.tip_error_95_m().expect("joint"));
     let apart = off.moved_by_arm_m().expect("the links are off");
     assert!(stated > apart && stated > by_noise, "{apart} {by_noise} {stated}");
     let covariances = off.link_covariances().expect("joint");
     assert!(covariances.hand_eye.trace() > off.hand_eye_covariance().expect("joint").trace());
-    assert!(said_of_off.contains("errors of the arm"), "{said_of_off}");
+    assert!(stated_off.contains("errors of the arm"), "{stated_off}");
     assert_eq!(exact.moved_by_arm_m(), None);
-    assert!(!said_of_exact.contains("errors of the arm"), "{said_of_exact}");
+    assert!(!stated_exact.contains("errors of the arm"), "{stated_exact}");
 }
 
 #[test]
@@ -161,7 +161,7 @@ fn where_another_size_is_not_certain_the_errors_of_the_arm_count_that_it_may_be_
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
         let of = |fit: &Fit| {
             let arm = fit.arm().expect("the joints are known");
-            let shape = arm.shape().filter(|_| arm.beside.free.scale).expect("another size is shown");
+            let shape = arm.shape().filter(|_| arm.others.free.scale).expect("another size is shown");
             ((shape.shape.scale - 1.0).abs(), shape.scale_sigma.expect("estimated"))
         };
         let (off, sigma) = of(&larger(mode, 0.013, [2e-5, 1e-4]));

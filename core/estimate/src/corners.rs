@@ -294,7 +294,7 @@ fn without_hand_eye(observations: &Observations, seen: &[DetectedView<'_>], lens
         let view = &mut views[s.index];
         view.status = ViewStatus::Used;
         view.rms_px = Some(lens.rms_px[i]);
-        view.corners_aside.clone_from(&lens.aside[i]);
+        view.rejected_corners.clone_from(&lens.rejected[i]);
         if observations.mode.is_none() {
             // With a robot the residuals are those of its chain.
             view.residuals = residuals(&lens.intrinsics, &lens.camera_from_target[i], &points, &corners);
@@ -396,7 +396,7 @@ fn take_joint(
     for (i, s) in seen.iter().enumerate() {
         let view = &mut calibration.views[s.index];
         view.distance = screened.distances.get(i).copied();
-        view.corners_aside = screened.corners.iter().filter(|(v, _)| *v == i).map(|(_, index)| *index).collect();
+        view.rejected_corners = screened.corners.iter().filter(|(v, _)| *v == i).map(|(_, index)| *index).collect();
         let corners = &screened.views[i].corners;
         let fit = screened.kept.binary_search(&i).ok().map(|place| &solution.views[place]);
         let pose = match fit {

@@ -33,7 +33,7 @@ pub struct Lens {
     pub alternatives: Vec<Option<Pose<Camera, Target>>>,
     pub rms_px: Vec<f64>,
     /// Wrong corners of each view, by the index of their point, ascending.
-    pub aside: Vec<Vec<usize>>,
+    pub rejected: Vec<Vec<usize>>,
 }
 
 impl Lens {
@@ -61,7 +61,7 @@ impl Lens {
                 let options = Options { start, bend: Bend::IfShown, ..Options::new(model) };
                 let (target, size) = (&observations.target, observations.image_size);
                 let screened = intrinsics::solve_screened(&views, target, size, &options, keep_outliers, work.cancel);
-                let Screened { found, aside } = screened.map_err(|e| match e {
+                let Screened { found, rejected } = screened.map_err(|e| match e {
                     IntrinsicsError::Cancelled => CalibrateError::from(HandEyeError::Cancelled),
                     other => other.into(),
                 })?;
@@ -70,7 +70,7 @@ impl Lens {
                 if work.is_cancelled() {
                     return Err(HandEyeError::Cancelled.into());
                 }
-                let alternatives = alternatives(observations, seen, &found, &aside);
+                let alternatives = alternatives(observations, seen, &found, &rejected);
                 Ok(Self {
                     intrinsics: found.intrinsics,
                     free: true,
@@ -80,7 +80,7 @@ impl Lens {
                     camera_from_target: found.camera_from_target,
                     alternatives,
                     rms_px: found.rms_px,
-                    aside,
+                    rejected,
                 })
             }
         }
@@ -112,7 +112,7 @@ impl Lens {
             camera_from_target: poses.iter().map(|pose| pose.best.camera_from_target).collect(),
             alternatives: possible(&poses, &corners),
             rms_px: poses.iter().map(|pose| pose.best.rms_px).collect(),
-            aside: vec![Vec::new(); seen.len()],
+            rejected: vec![Vec::new(); seen.len()],
         })
     }
 
@@ -123,7 +123,7 @@ impl Lens {
 
     /// The corners of a view that the camera was found from.
     pub fn corners_left(&self, view: usize, corners: &Corners) -> Corners {
-        without(corners, &self.aside[view])
+        without(corners, &self.rejected[view])
     }
 }
 
@@ -153,10 +153,10 @@ fn alternatives(
     observations: &Observations,
     seen: &[DetectedView<'_>],
     found: &Found,
-    aside: &[Vec<usize>],
+    rejected: &[Vec<usize>],
 ) -> Vec<Option<Pose<Camera, Target>>> {
     let board = BoardPoints::new(&observations.target.points());
-    let kept: Vec<Corners> = seen.iter().zip(aside).map(|(s, aside)| without(s.corners, aside)).collect();
+    let kept: Vec<Corners> = seen.iter().zip(rejected).map(|(s, rejected)| without(s.corners, rejected)).collect();
     let poses: Vec<PlanarPose> = (kept.iter().zip(&found.camera_from_target).zip(&found.rms_px).zip(&found.mirrored))
         .map(|(((corners, pose), rms_px), mirrored)| {
             let (intrinsics, shape) = (&found.intrinsics, &found.shape);

@@ -111,7 +111,7 @@ mod wrong_corners;
 
 use nalgebra::{DMatrix, Matrix5, Matrix6, Point3, Vector2};
 
-pub use crate::arm_fit::{ArmFit, BesideArm};
+pub use crate::arm_fit::{ArmFit, OtherEstimates};
 use crate::handeye::closed_form::{self, ClosedFormSolution};
 use crate::handeye::joint::prediction::ErrorCurve;
 use crate::handeye::joint::{
@@ -557,7 +557,7 @@ pub struct ViewResult {
     /// How far the view is from what the others expect of it; `None` for a closed form.
     pub distance: Option<Distance>,
     /// Corners of it that were left out as outliers, by their index.
-    pub corners_aside: Vec<usize>,
+    pub rejected_corners: Vec<usize>,
     /// By how many quarter turns its target was numbered from another corner than detected, to agree with the others.
     pub quarter_turns: usize,
 }
@@ -575,7 +575,7 @@ impl ViewResult {
             residuals: Vec::new(),
             camera_from_target: None,
             distance: None,
-            corners_aside: Vec::new(),
+            rejected_corners: Vec::new(),
             quarter_turns: 0,
         }
     }

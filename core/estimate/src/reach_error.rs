@@ -217,7 +217,7 @@ impl Reach {
     /// reach. `None` where none of them is, and with a camera on the arm, for which a point in the camera is at a different place
     /// in each view.
     pub(crate) fn at_points(&self, in_camera: &[Point3<f64>]) -> Option<ReachErrors> {
-        let points = in_camera.iter().filter(|_| self.stands_still());
+        let points = in_camera.iter().filter(|_| self.is_eye_to_hand());
         points.filter_map(|point| self.errors(|_, _| *point)).reduce(ReachErrors::worse)
     }
 
@@ -233,7 +233,7 @@ impl Reach {
     }
 
     /// Whether the camera is next to the robot (eye to hand).
-    pub(crate) fn stands_still(&self) -> bool {
+    pub(crate) fn is_eye_to_hand(&self) -> bool {
         self.corrected.hand_eye.mode() == Mode::EyeToHand
     }
 

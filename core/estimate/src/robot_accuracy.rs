@@ -119,12 +119,12 @@ impl ReachByAccuracy {
     /// Errors at points in the coordinates of a camera next to the robot, metres: the largest of their errors. `None` with a camera
     /// on the arm.
     pub(crate) fn at_points(&self, in_camera: &[Point3<f64>]) -> Option<ReachErrors> {
-        let points = in_camera.iter().filter(|_| self.stands_still());
+        let points = in_camera.iter().filter(|_| self.is_eye_to_hand());
         points.filter_map(|point| self.errors(|_, _| *point)).reduce(ReachErrors::worse)
     }
 
     /// Whether the camera is next to the robot (eye to hand).
-    pub(crate) fn stands_still(&self) -> bool {
+    pub(crate) fn is_eye_to_hand(&self) -> bool {
         self.hand_eye.mode() == Mode::EyeToHand
     }
 

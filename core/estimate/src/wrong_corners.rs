@@ -26,8 +26,8 @@ pub(super) fn enough(left: usize, of: usize) -> bool {
 }
 
 /// The corners of a view without some, given by the index of their point, ascending.
-pub(super) fn without(corners: &Corners, aside: &[usize]) -> Corners {
+pub(super) fn without(corners: &Corners, rejected: &[usize]) -> Corners {
     let mut left = corners.clone();
-    left.retain(|corner| aside.binary_search(&corner.index).is_err());
+    left.retain(|corner| rejected.binary_search(&corner.index).is_err());
     left
 }

@@ -20,8 +20,8 @@ pub fn chosen(
     let fits = |camera: &&FoundCamera| {
         let k = &camera.intrinsics;
         let same = (k.width, k.height) == size;
-        let unsaid = (k.width, k.height) == (0, 0);
-        same || (unsaid && k.cx < f64::from(size.0) && k.cy < f64::from(size.1))
+        let unstated = (k.width, k.height) == (0, 0);
+        same || (unstated && k.cx < f64::from(size.0) && k.cy < f64::from(size.1))
     };
     let sized = |camera: &FoundCamera| {
         let mut camera = camera.clone();

@@ -277,6 +277,6 @@ fn files_that_are_written_to_take_for_ever_are_read_once() {
         format!("{{{}}}", fields.join(","))
     });
     let recording = open(folder.path()).expect("a recording");
-    let is_said = |why: &String| why.contains("rows.csv") && why.contains("lines");
-    assert!(recording.warnings.iter().map(Text::to_string).any(|why| is_said(&why)));
+    let is_reported = |why: &String| why.contains("rows.csv") && why.contains("lines");
+    assert!(recording.warnings.iter().map(Text::to_string).any(|why| is_reported(&why)));
 }

@@ -39,8 +39,8 @@ fn is_understood(path: &Path, pairs: &[(Isometry3<f64>, Isometry3<f64>)], what: 
     let (recording, judgement) = judged_alone(path, &in_hand()).unwrap_or_else(|why| panic!("{what}: {why}"));
     let best = &judgement.hypotheses[0];
     // Both lengths in another unit are the same recording of a smaller cell, which no data distinguish.
-    let is_said = |h: &&Hypothesis| h.reading.length == LengthUnit::Metre && h.explains();
-    let metres = judgement.hypotheses.iter().find(is_said).unwrap_or_else(|| panic!("{what}: {best:#?}"));
+    let is_reported = |h: &&Hypothesis| h.reading.length == LengthUnit::Metre && h.explains();
+    let metres = judgement.hypotheses.iter().find(is_reported).unwrap_or_else(|| panic!("{what}: {best:#?}"));
     let samples = &recording.tracks[metres.robot].samples;
     assert_eq!(samples.len(), pairs.len(), "{what}");
     for (sample, (pose, _)) in samples.iter().zip(pairs) {

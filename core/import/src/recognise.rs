@@ -37,7 +37,7 @@ pub fn open_within(path: &Path, bounds: &Bounds, budget: &Budget<'_>) -> Result<
     }
     let mut recording = Recording { bounds: bounds.clone(), ..Recording::default() };
     let belongs_to =
-        |file: &Path, named: &Path| of_ending(file).is_none_or(|(format, _)| format.is_beside(file, named));
+        |file: &Path, named: &Path| of_ending(file).is_none_or(|(format, _)| format.is_companion(file, named));
     let (root, files, named) = folder::list(path, belongs_to, bounds, budget, &mut recording.warnings)?;
     recording.root.clone_from(&root);
     recording.streams = folder::streams(&root, &files, budget, &mut recording.warnings);

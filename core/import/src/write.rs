@@ -318,7 +318,7 @@ fn comment(text: &mut String, line: impl std::fmt::Display) {
 
 fn comments(h: &Hypothesis, known: &Context<'_>, left_out: &[String]) -> String {
     let mut text = String::new();
-    comment(&mut text, "Imported by handeye. Poses are written anew in metres and quaternions; where they come from:");
+    comment(&mut text, "Imported by handeye. Poses are converted to metres and quaternions; their sources:");
     for belief in &known.recording.beliefs {
         comment(&mut text, format_args!("  {belief}"));
     }
@@ -351,7 +351,7 @@ fn comments(h: &Hypothesis, known: &Context<'_>, left_out: &[String]) -> String 
         comment(&mut text, format_args!("  target: {why}"));
     }
     if let Some(camera) = &known.camera {
-        comment(&mut text, format_args!("  camera: {}, {}; fixed = false estimates it anew", camera.name, camera.why));
+        comment(&mut text, format_args!("  camera: {}, {}; fixed = false estimates it again", camera.name, camera.why));
     }
     if !left_out.is_empty() {
         comment(&mut text, format_args!("Not written ({}):", left_out.len()));
@@ -388,7 +388,7 @@ pub fn provenance(key: &str, value: &str, h: &Hypothesis, known: &Context<'_>) -
     }
     // The residual of each relative to the target's distance, and as text.
     let left = |h: &Hypothesis| h.fit.as_ref().map(|fit| (fit.relative, format!("{:.2} mm", fit.median_m * 1e3)));
-    let (own, own_said) = left(h).unwrap_or((f64::INFINITY, "nothing".into()));
+    let (own, own_stated) = left(h).unwrap_or((f64::INFINITY, "nothing".into()));
     let other = known.judgement.hypotheses.iter().filter_map(|other| {
         let convention = other.conventions(known.recording).into_iter().find(|c| c.key == key)?;
         let (relative, reported) = left(other)?;
@@ -398,11 +398,11 @@ pub fn provenance(key: &str, value: &str, h: &Hypothesis, known: &Context<'_>) -
     match other.min_by(|a, b| a.0.total_cmp(&b.0)) {
         None => "nothing else is possible with these files, or explains the views nearly as well".into(),
         Some((relative, reported, value, _)) if rules_out(own, relative) => {
-            format!("by the data: it leaves {own_said}, {value} leaves {reported}")
+            format!("by the data: it leaves {own_stated}, {value} leaves {reported}")
         }
         Some((.., value, Some(why))) => format!("by the data: {value} is contradicted: {why}"),
         Some((_, reported, value, None)) => {
-            format!("not decided by the data: it leaves {own_said}, {value} leaves {reported}")
+            format!("not decided by the data: it leaves {own_stated}, {value} leaves {reported}")
         }
     }
 }

@@ -41,13 +41,13 @@ fn corner(column: f64, row: f64) -> Point3<f64> {
 fn random_pose(random: &mut ChaCha8Rng, camera: &Intrinsics, roll: f64) -> Isometry3<f64> {
     loop {
         let distance = random.random_range(0.3..0.6);
-        let aside = Vector2::new(random.random_range(-0.12..0.12), random.random_range(-0.10..0.10));
+        let lateral = Vector2::new(random.random_range(-0.12..0.12), random.random_range(-0.10..0.10));
         let towards: f64 = random.random_range(0.0..std::f64::consts::TAU);
         let tilt_axis = Vector3::new(towards.cos(), towards.sin(), 0.0);
         let tilt = UnitQuaternion::from_scaled_axis(tilt_axis * random.random_range(0.0..45f64.to_radians()));
         let roll = UnitQuaternion::from_scaled_axis(Vector3::z() * random.random_range(-roll..roll));
         let middle = corner(4.5, 3.0).coords;
-        let pose = Isometry3::from_parts(Translation3::new(aside.x, aside.y, distance), tilt * roll)
+        let pose = Isometry3::from_parts(Translation3::new(lateral.x, lateral.y, distance), tilt * roll)
             * Translation3::from(-middle);
         let ends = [(-1.0, -1.0), (10.0, -1.0), (10.0, 7.0), (-1.0, 7.0)];
         let inside = |px: Vector2<f64>| px.x > 4.0 && px.y > 4.0 && px.x < 635.0 && px.y < 475.0;

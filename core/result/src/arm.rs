@@ -181,7 +181,7 @@ impl ArmEstimate {
         let of_errors = of_document(&fit.errors, &fit.errors_covariance());
         let lens_sigma = fit.intrinsics_sigma();
         let sigma = lens_sigma.first_chunk().copied();
-        let intrinsics = IntrinsicsEstimate::new(&fit.beside.intrinsics, sigma, lens_sigma.is_empty());
+        let intrinsics = IntrinsicsEstimate::new(&fit.others.intrinsics, sigma, lens_sigma.is_empty());
         Some(Self {
             chain: chain.clone(),
             tool_m,
@@ -317,7 +317,7 @@ mod tests {
         }
         assert_eq!(here.covariance, there.covariance);
         let lens = read.intrinsics.as_ref().and_then(IntrinsicsEstimate::intrinsics);
-        assert_eq!(lens, Some(fit.beside.intrinsics), "the lens that goes with its hand-eye");
+        assert_eq!(lens, Some(fit.others.intrinsics), "the lens that goes with its hand-eye");
         let joints = [0.1, -1.2, 1.4, -1.8, -1.6, 0.2];
         let (a, b) = (here.error_95_m(&joints).expect("six"), there.error_95_m(&joints).expect("six"));
         assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");

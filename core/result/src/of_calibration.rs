@@ -200,7 +200,7 @@ fn view(view: &ViewResult) -> ViewRecord {
         rms_px: view.rms_px,
         influence_mm: view.influence_m.map(|m| m * 1e3),
         distance: view.distance.map(|d| d.of_limit).filter(|d| d.is_finite()),
-        corners_aside: view.corners_aside.clone(),
+        rejected_corners: view.rejected_corners.clone(),
         renumbered: view.quarter_turns != 0,
     }
 }

@@ -14,7 +14,7 @@ use handeye_estimate::handeye::joint::{
     ArmErrors, Free, Noise, PoseDependentError, Slopes, SmallSample, arm_parameters,
 };
 use handeye_estimate::uncertainty::overdispersion::{Evidence, Overdispersion};
-use handeye_estimate::{ArmFit, BesideArm};
+use handeye_estimate::{ArmFit, OtherEstimates};
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_geometry::targets::bent::BoardShape;
@@ -59,7 +59,7 @@ pub fn golden() -> CalibrationResult {
             rms_px: Some(0.3),
             influence_mm: None,
             distance: (status == ViewRecordStatus::Outlier).then_some(3.5),
-            corners_aside: vec![4, 17],
+            rejected_corners: vec![4, 17],
             renumbered: status == ViewRecordStatus::Excluded,
         })
         .collect();
@@ -170,7 +170,7 @@ pub fn golden_arm() -> (Arm, ArmFit) {
     let fit = ArmFit {
         errors,
         hand_eye: HandEye::EyeInHand { tip_from_camera: golden_pose(), base_from_target },
-        beside: BesideArm {
+        others: OtherEstimates {
             intrinsics: Intrinsics::pinhole(640, 480, 600.0),
             shape: BoardShape::default(),
             depth: DepthBias::default(),

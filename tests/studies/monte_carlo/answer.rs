@@ -30,7 +30,7 @@ pub struct Answer {
     pub small_sample: SmallSample,
     pub noise: Noise,
     /// Views that were excluded as outliers.
-    pub aside: usize,
+    pub outliers: usize,
     pub tip_error_95_m: f64,
     /// Where that error is stated, camera coordinates.
     pub reference_point: Point3<f64>,
@@ -118,7 +118,7 @@ pub fn joint(trial: &Trial, start: &Start, noise_given: bool) -> Result<Answer, 
         covariance: solution.hand_eye_covariance(),
         small_sample: solution.small_sample,
         noise: solution.noise,
-        aside: 0,
+        outliers: 0,
         tip_error_95_m: quality::tip_error_95_m(&solution),
         reference_point: solution.reference_point,
     })
@@ -147,7 +147,7 @@ pub fn product(trial: &Trial) -> Result<Answer, String> {
         covariance,
         small_sample: joint.small_sample,
         noise: joint.noise,
-        aside: found.views.iter().filter(|view| view.status == ViewStatus::Outlier).count(),
+        outliers: found.views.iter().filter(|view| view.status == ViewStatus::Outlier).count(),
         tip_error_95_m: quality::tip_error_95_at(&covariance, joint.small_sample, &joint.reference_point),
         reference_point: joint.reference_point,
     })

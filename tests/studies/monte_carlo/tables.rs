@@ -87,7 +87,7 @@ pub fn coverage(summaries: &[Summary]) -> String {
             lead(&s.cell),
             covered(&s.given),
             covered(&s.estimated),
-            s.estimated.aside,
+            s.estimated.outliers,
             s.trials,
             s.given.failures,
             s.estimated.failures,

@@ -44,7 +44,7 @@ pub struct Judged {
     /// Whether the stated tip error is not exceeded.
     pub tip_covered: bool,
     /// Outlier views, minus those that are wrong.
-    pub aside: f64,
+    pub outliers: f64,
     /// Estimated over true noise levels: corner, robot in translation and in rotation; the levels themselves in µm and
     /// millidegrees if the robot is exact.
     pub noise: [f64; 3],
@@ -69,7 +69,7 @@ impl Judged {
         Some(Self {
             deviation: Deviation::new(truth, estimate),
             mahalanobis2,
-            aside: answer.aside as f64 - trial.wrong.iter().filter(|wrong| **wrong).count() as f64,
+            outliers: answer.outliers as f64 - trial.wrong.iter().filter(|wrong| **wrong).count() as f64,
             covered: answer.small_sample.scale * mahalanobis2 <= limit(answer.small_sample.degrees_of_freedom)?,
             tip_covered: at_point.norm() <= answer.tip_error_95_m,
             noise: [
@@ -149,7 +149,7 @@ pub struct Performance {
     pub tip_covered: f64,
     pub mean_mahalanobis2: f64,
     /// Mean number of views excluded as outliers, minus those that are wrong.
-    pub aside: f64,
+    pub outliers: f64,
     /// Root mean squares of [`Judged::noise`], and its standard deviations.
     pub noise: [f64; 3],
     pub noise_scatter: [f64; 3],
@@ -183,7 +183,7 @@ impl Performance {
             covered: share(|j| j.covered),
             tip_covered: share(|j| j.tip_covered),
             mean_mahalanobis2: mean(&|j| j.mahalanobis2),
-            aside: mean(&|j| j.aside),
+            outliers: mean(&|j| j.outliers),
             noise: std::array::from_fn(|i| mean(&|j| j.noise[i].powi(2)).sqrt()),
             noise_scatter: std::array::from_fn(|i| mean(&|j| (j.noise[i] - noise_mean[i]).powi(2)).sqrt()),
             failures,

@@ -340,7 +340,7 @@ fn keep_earlier_session(folder: &Path) -> Result<(), Failure> {
         .find(|path| !path.exists())
         .unwrap_or_else(|| folder.with_file_name(format!("{name}.earlier")));
     std::fs::rename(folder, &kept).map_err(|error| {
-        Failure::failed(anyhow::anyhow!("the earlier session {} cannot be moved aside: {error}", folder.display()))
+        Failure::failed(anyhow::anyhow!("the earlier session {} cannot be renamed: {error}", folder.display()))
     })?;
     tracing::warn!("{} held a session already; it is now {}", folder.display(), kept.display());
     Ok(())

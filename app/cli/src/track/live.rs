@@ -20,7 +20,7 @@ use crate::towards_board::TowardsBoard;
 use crate::{Failure, out, record};
 use handeye_record::Recorder;
 use handeye_workbench::model::{FollowRequest, FollowStatus, Step, Tracked};
-use handeye_workbench::motion::correction::stands_here;
+use handeye_workbench::motion::correction::is_connected_arm;
 use handeye_workbench::recording::{Entry, Recording as _};
 use handeye_workbench::session::start::REFERENCE_POSES;
 use handeye_workbench::text::Language;
@@ -123,7 +123,7 @@ impl Job<'_> {
     fn by_on(&self, cell: &mut OpenCell) -> Result<TrackedBy, Failure> {
         let Some(corrected) = &self.corrected else { return Ok(self.by.clone()) };
         let now = cell.robot_state()?;
-        if corrected.arm.as_ref().is_some_and(|arm| stands_here(arm, &now)) {
+        if corrected.arm.as_ref().is_some_and(|arm| is_connected_arm(arm, &now)) {
             tracing::info!("tip poses are corrected for the errors of the arm, and so is what it is sent");
             return Ok(corrected.clone());
         }
@@ -332,16 +332,16 @@ const STANDS_STILL: Duration = Duration::from_secs(1);
 #[derive(Default)]
 struct Pause {
     since: Option<Instant>,
-    is_said: bool,
+    is_reported: bool,
 }
 
 impl Pause {
     fn look(&mut self, control: &mut dyn ControlPort) -> Result<(), PortError> {
         let since = *self.since.get_or_insert_with(Instant::now);
-        if self.is_said || since.elapsed() < STANDS_STILL {
+        if self.is_reported || since.elapsed() < STANDS_STILL {
             return Ok(());
         }
-        self.is_said = true;
+        self.is_reported = true;
         let Some(state) = control.state()? else { return Ok(()) };
         match state.simulation {
             Simulation::Running => {
@@ -356,7 +356,7 @@ impl Pause {
     }
 
     fn is_over(&mut self) {
-        if self.is_said {
+        if self.is_reported {
             tracing::info!("the simulation goes on");
         }
         *self = Self::default();

@@ -81,10 +81,10 @@ pub struct TrackArgs {
 pub fn run(args: &TrackArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();
     let mut scene = args.cell.scene()?;
-    let calibration::Read { calibrated, corrected, target: said_target } = calibration::read(&args.calibration)?;
+    let calibration::Read { calibrated, corrected, target: stated_target } = calibration::read(&args.calibration)?;
     let target = match &args.target {
         Some(text) => calibration::chessboard(text)?,
-        None => said_target.ok_or_else(|| {
+        None => stated_target.ok_or_else(|| {
             Failure::unusable(anyhow::anyhow!(
                 "{} does not say which board it was made with: give --target, for example --target 10x7x15",
                 args.calibration.display()

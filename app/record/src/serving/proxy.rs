@@ -50,7 +50,7 @@ pub(super) fn start(runtime: &Runtime, limit_bytes: u64) -> (ProxySink, Reader) 
             ProxyMessage::Message(message) => Some(*message),
             ProxyMessage::Flush(arrived) => {
                 // The caller may be gone.
-                let _told = arrived.try_send(()).is_ok();
+                let _sent = arrived.try_send(()).is_ok();
                 None
             }
         });

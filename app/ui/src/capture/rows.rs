@@ -56,9 +56,9 @@ pub struct CaptureRow {
     /// Noise of a corner of its image \[px\].
     pub corner_noise_px: Option<f64>,
     /// How far it is from the others, if the estimate excluded it.
-    pub aside: Option<RejectedCapture>,
+    pub rejected: Option<RejectedCapture>,
     /// How many of its corners the estimate excluded as outliers.
-    pub corners_aside: usize,
+    pub rejected_corners: usize,
     /// What the calibration finds remarkable about it.
     pub found: Vec<FindingCode>,
 }
@@ -70,8 +70,8 @@ impl CaptureRow {
     }
 
     /// Whether the answer does not use it although it is meant to be in the fit.
-    pub fn is_aside(&self) -> bool {
-        self.aside.is_some() && !self.excluded && !self.verifies()
+    pub fn is_rejected(&self) -> bool {
+        self.rejected.is_some() && !self.excluded && !self.verifies()
     }
 
     /// What it is used for.
@@ -79,7 +79,7 @@ impl CaptureRow {
         match (self.excluded, self.role) {
             (true, _) => CaptureUse::Excluded,
             (false, Role::Verification) => CaptureUse::Verification,
-            (false, Role::Calibration) if self.is_aside() => CaptureUse::Rejected,
+            (false, Role::Calibration) if self.is_rejected() => CaptureUse::Rejected,
             (false, Role::Calibration) => CaptureUse::Fit,
         }
     }
@@ -221,8 +221,8 @@ fn plain_row(model: &Model, record: &CaptureRecord) -> CaptureRow {
         correction_deg: None,
         influence_mm: None,
         corner_noise_px: record.corner_noise_px,
-        aside: None,
-        corners_aside: 0,
+        rejected: None,
+        rejected_corners: 0,
         found: Vec::new(),
     }
 }
@@ -244,8 +244,8 @@ fn add_solution(rows: &mut [CaptureRow], solved: &Solved) {
         row.correction_mm = finite(view.correction_m.map(|metres| metres * 1e3));
         row.correction_deg = finite(view.correction_rad.map(f64::to_degrees));
         row.influence_mm = finite(view.influence_m.map(|metres| metres * 1e3));
-        row.aside = aside(view);
-        row.corners_aside = view.corners_aside.len();
+        row.rejected = rejected(view);
+        row.rejected_corners = view.rejected_corners.len();
     }
     let Some(Ok(verification)) = &solved.verification else { return };
     for (id, check) in solved.verified_captures.iter().zip(&verification.captures) {
@@ -255,7 +255,7 @@ fn add_solution(rows: &mut [CaptureRow], solved: &Solved) {
     }
 }
 
-fn aside(view: &ViewResult) -> Option<RejectedCapture> {
+fn rejected(view: &ViewResult) -> Option<RejectedCapture> {
     let board_off = view.distance.map(|distance| (distance.metres * 1e3, distance.radians.to_degrees()));
     (view.status == ViewStatus::Outlier)
         .then(|| RejectedCapture { board_off: board_off.filter(|(mm, deg)| mm.is_finite() && deg.is_finite()) })
@@ -318,11 +318,11 @@ mod tests {
         let model = sample::with_an_outlier();
         let table = table(&Context::default(), &model);
         let row = table.row(sample::OUTLIER).expect("a row");
-        assert!(row.is_aside() && row.influence_mm.is_none());
-        let (mm, deg) = row.aside.and_then(|aside| aside.board_off).expect("a distance");
+        assert!(row.is_rejected() && row.influence_mm.is_none());
+        let (mm, deg) = row.rejected.and_then(|rejected| rejected.board_off).expect("a distance");
         assert!((mm - 12.3).abs() < 1e-9 && (deg - 1.5).abs() < 1e-9, "{mm} mm, {deg}°");
-        assert_eq!(table.rows.iter().filter(|row| row.is_aside()).count(), 1);
+        assert_eq!(table.rows.iter().filter(|row| row.is_rejected()).count(), 1);
         let excluded = CaptureRow { excluded: true, ..row.clone() };
-        assert!(!excluded.is_aside(), "who took it out by hand knows");
+        assert!(!excluded.is_rejected(), "who took it out by hand knows");
     }
 }

@@ -87,7 +87,7 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: 
     let language = model.view.language;
     let Some(guided) = sequence.guided.as_deref() else { return };
     if !model.sequence_runs {
-        if let Some(message) = model.messages.standing_in(Pane::Poses) {
+        if let Some(message) = model.messages.shown_in(Pane::Poses) {
             parts::notice_ui(ui, Tone::Warning, &message.text.in_language(language), |_| ());
         } else if let Some(ending) = guided.ending.as_ref().filter(|_| model.solve.fresh) {
             let tone = if ending.is_success() { Tone::Good } else { Tone::Warning };

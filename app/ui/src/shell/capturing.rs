@@ -9,7 +9,7 @@ use handeye_workbench::text::Text;
 const REFUSAL_S: f64 = 8.0;
 
 /// Whether the last refusal of a capture is shown over the image.
-pub fn stands_over_image(model: &Model) -> bool {
+pub fn covers_image(model: &Model) -> bool {
     model.refused.as_ref().is_some_and(|refused| model.now_s - refused.at_s < REFUSAL_S)
 }
 

@@ -14,11 +14,8 @@ use handeye_plan::guided::Ending;
 const MANUAL: &str = "The robot refuses: the pendant is in manual mode";
 
 /// What is shown in a pane, which is in the log as well.
-fn standing(app: &App, pane: Pane) -> String {
-    app.model()
-        .messages
-        .standing_in(pane)
-        .map_or_else(String::new, |message| message.text.in_language(Language::English))
+fn shown(app: &App, pane: Pane) -> String {
+    app.model().messages.shown_in(pane).map_or_else(String::new, |message| message.text.in_language(Language::English))
 }
 
 fn moved(app: &mut App, outcome: MotionOutcome) {
@@ -38,7 +35,7 @@ fn a_robot_that_does_not_make_the_first_move_of_guided_capture_says_why_and_not_
     app.apply(guided::Command::CalibrateForMe);
     refuse(app);
     assert!(!app.model().sequence_runs);
-    assert_eq!(standing(app, Pane::Poses), MANUAL);
+    assert_eq!(shown(app, Pane::Poses), MANUAL);
 }
 
 #[test]
@@ -65,7 +62,7 @@ fn one_move_that_is_refused_is_a_pose_left_out_and_two_in_a_row_break_guided_cap
     choose(app);
     refuse(app);
     assert!(!app.model().sequence_runs);
-    assert!(standing(app, Pane::Poses).ends_with(MANUAL), "{}", standing(app, Pane::Poses));
+    assert!(shown(app, Pane::Poses).ends_with(MANUAL), "{}", shown(app, Pane::Poses));
     app.apply(taught::Command::ContinueSequence);
     assert!(app.model().sequence_runs, "once the pendant is in automatic mode");
 }
@@ -79,7 +76,7 @@ fn a_sequence_that_is_broken_off_says_why_in_its_pane() {
     let id = app.cx.numbers.motion;
     app.absorb(taught::Event::Planned { id, views: Ok(vec![[0.1; 6].into(); 3]) });
     moved(app, MotionOutcome::Failed(Text::verbatim("The robot stopped: protective stop")));
-    assert!(standing(app, Pane::Verify).ends_with("protective stop"), "{}", standing(app, Pane::Verify));
+    assert!(shown(app, Pane::Verify).ends_with("protective stop"), "{}", shown(app, Pane::Verify));
 
     app.apply(taught::Command::ContinueSequence);
     moved(app, MotionOutcome::Arrived);
@@ -90,7 +87,7 @@ fn a_sequence_that_is_broken_off_says_why_in_its_pane() {
         refused: CaptureRefused { kind: RefusalKind::NoImages, why, at_s: 3.0 },
     });
     assert!(!app.model().sequence_runs);
-    assert!(standing(app, Pane::Verify).ends_with("No images have come for 5 s"), "{}", standing(app, Pane::Verify));
+    assert!(shown(app, Pane::Verify).ends_with("No images have come for 5 s"), "{}", shown(app, Pane::Verify));
 }
 
 #[test]

@@ -105,15 +105,15 @@ fn objects_of_another_scene_and_connect_again_make_a_new_connection_to_an_addres
 #[test]
 fn who_connects_to_another_cell_with_captures_at_hand_is_told_of_a_new_session() {
     let mut bench = bench(&FakeCell::new(0));
-    let told = |bench: &mut Bench, port: u16| {
+    let reported = |bench: &mut Bench, port: u16| {
         let source = CellSource::Address(format!("tcp://127.0.0.1:{port}"));
         bench.app.apply(connect::Command::Connect(source));
         reported(&bench.app).contains("begin a new session")
     };
-    assert!(!told(&mut bench, 9), "nothing was captured");
+    assert!(!reported(&mut bench, 9), "nothing was captured");
     bench.app.cx.model.session.document = sample::solved().session.document;
-    assert!(!told(&mut bench, 9), "it is the same cell");
-    assert!(told(&mut bench, 8));
+    assert!(!reported(&mut bench, 9), "it is the same cell");
+    assert!(reported(&mut bench, 8));
 }
 
 #[test]

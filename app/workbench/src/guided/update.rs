@@ -178,7 +178,7 @@ fn guided_is_elsewhere(model: &mut Model) -> bool {
 }
 
 /// The same for a pose that the user has just allowed the arm to move to.
-pub(crate) fn guided_chooses_anew(model: &mut Model) -> bool {
+pub(crate) fn guided_chooses_again(model: &mut Model) -> bool {
     let is_elsewhere = guided_is_elsewhere(model);
     if is_elsewhere {
         guided_leaves_out(model);

@@ -59,8 +59,8 @@ impl Looked {
         let judged = import::judge(&self.recording, &self.sights, settings, cancel);
         if let Some(why) = &self.unseen {
             let is_explained = |judgement: &Judgement| judgement.verdict != Verdict::Unexplained;
-            let is_told = matches!(&judged, Err(ImportError::DidNotMove { .. } | ImportError::BadChoice { .. }));
-            if !is_told && !judged.as_ref().is_ok_and(is_explained) && !cancel.is_cancelled() {
+            let is_reported = matches!(&judged, Err(ImportError::DidNotMove { .. } | ImportError::BadChoice { .. }));
+            if !is_reported && !judged.as_ref().is_ok_and(is_explained) && !cancel.is_cancelled() {
                 return Err(NotUnderstood::Target(why.clone()));
             }
         }

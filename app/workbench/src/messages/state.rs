@@ -110,7 +110,7 @@ impl Messages {
     }
 
     /// What a pane has to show that still applies: the last warning or error that has its place there.
-    pub fn standing_in(&self, pane: Pane) -> Option<&Message> {
+    pub fn shown_in(&self, pane: Pane) -> Option<&Message> {
         let last = self.kept.iter().rev().find(|message| message.home == Home::Pane(pane))?;
         (last.severity != Severity::Info && !last.dismissed).then_some(last)
     }
@@ -167,11 +167,11 @@ mod tests {
         messages.notify(Severity::Error, Text::verbatim("elsewhere"), 2.0);
         messages.notify(Severity::Info, Text::verbatim("done"), 3.0);
         let reported = |message: Option<&Message>| message.map(|message| message.number);
-        assert_eq!(reported(messages.standing_in(Pane::Jog)), Some(0));
-        assert_eq!(reported(messages.standing_in(Pane::Track)), None);
+        assert_eq!(reported(messages.shown_in(Pane::Jog)), Some(0));
+        assert_eq!(reported(messages.shown_in(Pane::Track)), None);
         assert_eq!(reported(messages.status_line()), Some(2));
         messages.is_over_in(Pane::Jog);
-        assert_eq!(reported(messages.standing_in(Pane::Jog)), None);
+        assert_eq!(reported(messages.shown_in(Pane::Jog)), None);
     }
 
     #[test]

@@ -16,11 +16,11 @@ const FITS: (f64, f64) = (1e-3, 2e-3);
 pub fn corrected(model: &Model) -> Option<(&Solved, &Corrected)> {
     let solved = model.solve.current()?;
     let corrected = solved.corrected.as_ref()?;
-    stands_here(&corrected.arm, model.robot.as_ref()?).then_some((solved, corrected))
+    is_connected_arm(&corrected.arm, model.robot.as_ref()?).then_some((solved, corrected))
 }
 
 /// Whether this is the arm that reports this state.
-pub fn stands_here(arm: &CorrectedArm, robot: &RobotState) -> bool {
+pub fn is_connected_arm(arm: &CorrectedArm, robot: &RobotState) -> bool {
     let place = arm.arm.forward(&robot.joints_rad).map(|tip| tip.distance_to(&robot.base_from_tip));
     place.is_ok_and(|(off_m, off_rad)| off_m <= FITS.0 && off_rad <= FITS.1)
 }

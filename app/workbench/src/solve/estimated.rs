@@ -27,8 +27,8 @@ pub struct EstimatedValue {
 /// All of it, one line each; what is as usual is not reported.
 pub fn estimated(calibration: &Calibration, depth: Option<&DepthReport>) -> Vec<EstimatedValue> {
     let mut lines = Vec::new();
-    lines.extend(views_aside(calibration));
-    lines.extend(corners_aside(calibration));
+    lines.extend(outlier_views(calibration));
+    lines.extend(rejected_corners(calibration));
     let depths = calibration.joint.as_ref().and_then(|joint| joint.depths.as_ref());
     lines.extend(depth.and_then(|report| depth_camera(report, depths.map(|depths| &depths.in_fit))));
     let Some(joint) = &calibration.joint else { return lines };
@@ -44,7 +44,7 @@ pub fn estimated(calibration: &Calibration, depth: Option<&DepthReport>) -> Vec<
     lines
 }
 
-fn views_aside(calibration: &Calibration) -> Option<EstimatedValue> {
+fn outlier_views(calibration: &Calibration) -> Option<EstimatedValue> {
     let count = calibration.views.iter().filter(|view| view.status == ViewStatus::Outlier).count();
     let taken = calibration.views.iter().filter(|view| view.status == ViewStatus::Used).count();
     (count > 0).then(|| EstimatedValue {
@@ -55,9 +55,9 @@ fn views_aside(calibration: &Calibration) -> Option<EstimatedValue> {
     })
 }
 
-fn corners_aside(calibration: &Calibration) -> Option<EstimatedValue> {
-    let views = calibration.views.iter().filter(|view| !view.corners_aside.is_empty()).count();
-    let count: usize = calibration.views.iter().map(|view| view.corners_aside.len()).sum();
+fn rejected_corners(calibration: &Calibration) -> Option<EstimatedValue> {
+    let views = calibration.views.iter().filter(|view| !view.rejected_corners.is_empty()).count();
+    let count: usize = calibration.views.iter().map(|view| view.rejected_corners.len()).sum();
     (count > 0).then(|| EstimatedValue {
         what: text!("Outlier corners"),
         value: text!("{count}, in {views} of {of} views", count = count, views = views, of = calibration.views.len()),
@@ -271,19 +271,19 @@ mod tests {
             lens: 1.0,
             checks: Vec::new(),
         };
-        let is_said = |times| {
+        let is_reported = |times| {
             let lines = reported(|calibration| calibration.joint.as_mut().expect("joint").widening = widened(times));
             lines.iter().any(|(what, _)| what == "Uncertainty widened")
         };
-        assert!(!is_said(1.01) && is_said(1.1));
+        assert!(!is_reported(1.01) && is_reported(1.1));
     }
 
     #[test]
     fn everything_is_said_with_its_unit() {
         let lines = reported(|c| {
             c.views[0].status = ViewStatus::Outlier;
-            c.views[1].corners_aside = vec![3, 4];
-            c.views[2].corners_aside = vec![5];
+            c.views[1].rejected_corners = vec![3, 4];
+            c.views[2].rejected_corners = vec![5];
             let joint = c.joint.as_mut().expect("a joint estimate");
             joint.shape = Some(ShapeEstimate {
                 shape: BoardShape { warp_m: [4e-4, -1e-4], scale: 1.001 },

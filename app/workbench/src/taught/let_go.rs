@@ -1,7 +1,7 @@
 //! What the user decides of a move that waits: it begins, or it is left out.
 
 use crate::app::context::Context;
-use crate::guided::update::{guided_chooses_anew, guided_skips};
+use crate::guided::update::{guided_chooses_again, guided_skips};
 use crate::motion::ask::asks_before;
 use crate::motion::state::PendingMove;
 use crate::motion::update::start_motion;
@@ -12,7 +12,7 @@ use handeye_wording::text;
 /// The user allows the move.
 pub(crate) fn confirm_move(cx: &mut Context) {
     let Some(PendingMove { goal, what }) = cx.model.asked.take() else { return };
-    if guided_chooses_anew(&mut cx.model) {
+    if guided_chooses_again(&mut cx.model) {
         return;
     }
     cx.model.let_go = true;

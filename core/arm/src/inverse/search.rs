@@ -240,8 +240,8 @@ impl<'a> Search<'a> {
                 request[i] = -from_middle.signum() * half * excess;
             }
         }
-        let aside = free * request;
-        let motion = request - damped_step(free, &aside, damping)?;
+        let sideways = free * request;
+        let motion = request - damped_step(free, &sideways, damping)?;
         let length = motion.norm();
         Some(if length > most { motion * (most / length) } else { motion })
     }

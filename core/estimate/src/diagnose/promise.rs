@@ -95,7 +95,7 @@ impl Calibration {
     pub fn promised(&self, goal_m: f64, tool_box: Option<&TipBox>) -> Option<Promised> {
         let reach = match tool_box {
             None => self.reach_errors(),
-            Some(tool_box) if self.reaches_beside() => Some(self.reach_in(tool_box)?),
+            Some(tool_box) if self.is_known_eye_to_hand() => Some(self.reach_in(tool_box)?),
             Some(_) => None,
         };
         let point_m = match tool_box {
@@ -120,15 +120,15 @@ impl Calibration {
     /// `None` where the arm is not known or reaches too few points, and where no commands are corrected.
     pub fn reach_weight(&self, tool_box: Option<&TipBox>) -> Option<DMatrix<f64>> {
         let points = tool_box.map(TipBox::corners_and_middle);
-        let reach = self.reach.as_ref().filter(|reach| points.is_none() || reach.stands_still())?;
+        let reach = self.reach.as_ref().filter(|reach| points.is_none() || reach.is_eye_to_hand())?;
         self.reach_at_target?.corrected_95_m?;
         reach.weight(points.as_ref().map(|points| &points[..]))
     }
 
     /// Whether it is known how near a tool arrives at points of a camera next to the robot.
-    fn reaches_beside(&self) -> bool {
-        let stands_still = |by_accuracy: &ReachByAccuracy| by_accuracy.stands_still();
-        self.reach.as_ref().map_or(self.reach_by_accuracy.as_ref().is_some_and(stands_still), Reach::stands_still)
+    fn is_known_eye_to_hand(&self) -> bool {
+        let is_eye_to_hand = |by_accuracy: &ReachByAccuracy| by_accuracy.is_eye_to_hand();
+        self.reach.as_ref().map_or(self.reach_by_accuracy.as_ref().is_some_and(is_eye_to_hand), Reach::is_eye_to_hand)
     }
 
     fn reach_in(&self, tool_box: &TipBox) -> Option<ReachErrors> {

@@ -28,7 +28,7 @@ pub struct Screened {
     /// The camera from the corners that are left.
     pub found: Found,
     /// Wrong corners of each view, by the index of their point, ascending.
-    pub aside: Vec<Vec<usize>>,
+    pub rejected: Vec<Vec<usize>>,
 }
 
 /// [`solve`] with the corners weighted by what their detector states, and without those that are simply wrong.
@@ -57,20 +57,20 @@ pub fn solve_screened(
         solve(&seen, target, size, options, cancel)
     };
     let all: Vec<Corners> = views.iter().copied().cloned().collect();
-    let mut now = Screened { found: fit(&all, options)?, aside: vec![Vec::new(); views.len()] };
+    let mut now = Screened { found: fit(&all, options)?, rejected: vec![Vec::new(); views.len()] };
     if keep_all {
         return Ok(now);
     }
     let board = BoardPoints::new(&target.points());
     for _ in 0..ROUNDS {
-        let aside = wrong(views, &board, &now.found);
-        if aside == now.aside {
+        let rejected = wrong(views, &board, &now.found);
+        if rejected == now.rejected {
             break;
         }
         let left: Vec<Corners> =
-            views.iter().zip(&aside).map(|(view, aside)| wrong_corners::without(view, aside)).collect();
+            views.iter().zip(&rejected).map(|(view, rejected)| wrong_corners::without(view, rejected)).collect();
         let options = Options { start: Some(now.found.intrinsics), ..*options };
-        now = Screened { found: fit(&left, &options)?, aside };
+        now = Screened { found: fit(&left, &options)?, rejected };
     }
     Ok(now)
 }

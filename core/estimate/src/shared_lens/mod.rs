@@ -167,12 +167,12 @@ pub fn calibrate_sharing_lens<'a>(
     let agreement = agreement::test(sessions, &alone).ok_or(SharedLensError::NoLens)?;
     let refit = |i: usize, round: usize, last: &Refit, others: LensEstimate| {
         let (session, prepared) = (&sessions[i], &prepared[i]);
-        let anew = || -> Result<Fitted<Refit>, CalibrateError> {
+        let again = || -> Result<Fitted<Refit>, CalibrateError> {
             let others = others.clone().times(last.factor);
             let refined = prepared.refine(Some(others.as_prior()), options, work)?;
             fitted(prepared, refined, Some(others.as_prior()), None, work)
         };
-        let next = if round < DECIDING { anew() } else { distortion::again(prepared, last, &others, work) };
+        let next = if round < DECIDING { again() } else { distortion::again(prepared, last, &others, work) };
         next.map_err(|error| session.fails(error))
     };
     let shared = shared_lens::share(alone.clone(), DECIDING, refit)?;

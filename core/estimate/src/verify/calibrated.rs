@@ -117,8 +117,8 @@ impl Predictor {
         let uncertainty = reported.uncertainty?;
         Some(Self {
             hand_eye: arm.hand_eye,
-            intrinsics: arm.beside.intrinsics,
-            shape: arm.beside.shape,
+            intrinsics: arm.others.intrinsics,
+            shape: arm.others.shape,
             print_errors_m: reported.print_errors_m,
             field: None,
             arm: Some(arm.errors.clone()),
@@ -126,8 +126,8 @@ impl Predictor {
             small_sample: arm.small_sample,
             uncertainty: Some(Uncertainty {
                 noise: arm.noise,
-                depths: uncertainty.depths.map(|(_, weight)| (arm.beside.depth, weight)),
-                free: arm.beside.free,
+                depths: uncertainty.depths.map(|(_, weight)| (arm.others.depth, weight)),
+                free: arm.others.free,
                 covariance: arm.covariance.clone(),
                 ..uncertainty
             }),

@@ -95,8 +95,8 @@ impl DepthPlane {
 
     /// The depth of the plane at a place of the target as drawn, metres.
     pub fn depth_at(&self, place: &Point3<f64>) -> f64 {
-        let aside = place.xy().coords - self.place_m;
-        self.depth.dot(&Vector3::new(1.0, aside.x, aside.y))
+        let lateral = place.xy().coords - self.place_m;
+        self.depth.dot(&Vector3::new(1.0, lateral.x, lateral.y))
     }
 
     /// The same where the target is numbered from another corner, this many of its [quarter turns](TargetSpec::quarter_turns)

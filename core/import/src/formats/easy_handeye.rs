@@ -25,7 +25,7 @@ impl Format for EasyHandeye {
         &[("samples", Encoding::Yaml), ("calib", Encoding::Yaml)]
     }
 
-    fn is_beside(&self, file: &Path, named: &Path) -> bool {
+    fn is_companion(&self, file: &Path, named: &Path) -> bool {
         is_calib(file) && file.file_stem() == named.file_stem()
     }
 

@@ -66,7 +66,7 @@ pub(crate) trait Format: Sync {
     }
 
     /// Whether a file of its endings is read together with a named file, which may need it as a camera or a target.
-    fn is_beside(&self, _file: &Path, _named: &Path) -> bool {
+    fn is_companion(&self, _file: &Path, _named: &Path) -> bool {
         !self.is_of_poses()
     }
 

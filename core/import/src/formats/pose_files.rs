@@ -43,7 +43,7 @@ pub(super) fn tracks(files: &[File], reader: &Reader<'_>) -> Vec<Track> {
     let mut by_path: Vec<(String, Stated, Vec<Sample>)> = Vec::new();
     for file in files {
         let Some(fields) = file.value().map(tree::fields) else { continue };
-        let image = fields.image.map(|image| beside(reader.root, &file.path, image));
+        let image = fields.image.map(|image| next_to(reader.root, &file.path, image));
         for (path, numbers, stated) in fields.poses {
             if are_series && (path.contains('[') || path.ends_with(|c: char| c.is_ascii_digit())) {
                 continue;
@@ -155,7 +155,7 @@ fn role_of(files: &str, reader: &Reader<'_>) -> Role {
 }
 
 /// The name of an image with its folder, where it is next to the file that names it.
-fn beside(root: &Path, file: &Path, image: String) -> String {
+fn next_to(root: &Path, file: &Path, image: String) -> String {
     let path = file.with_file_name(&image);
     if root.join(&path).is_file() { path.display().to_string() } else { image }
 }

@@ -128,7 +128,7 @@ fn read(file: &str, text: &str) -> Option<Track> {
             row += text[counted_to..at].matches('\n').count();
             counted_to = at;
             samples.push(Sample {
-                image: image_beside(text, at),
+                image: image_near(text, at),
                 number: None,
                 place: Arc::new(text!("{file}, row {row}", file = file, row = row)),
                 numbers,
@@ -150,7 +150,7 @@ fn around(text: &str, at: usize) -> (&str, &str) {
 }
 
 /// The name of an image on the line of a pose.
-fn image_beside(text: &str, at: usize) -> Option<String> {
+fn image_near(text: &str, at: usize) -> Option<String> {
     let (before, rest) = around(text, at);
     let before = before.rfind('\n').map_or(before, |i| &before[i + 1..]);
     let rest = rest.find('\n').map_or(rest, |i| &rest[..i]);

@@ -40,7 +40,7 @@ pub(super) fn read(text: &str, file: &Path, root: &Path) -> Option<FoundCamera> 
     let mut fields = vec![("camera_matrix".to_owned(), list(&matrix))];
     let own = distortion(&runs, at);
     let beside = || {
-        let text = folder::text(&root.join(distortion_beside(file, root)?)).ok()?;
+        let text = folder::text(&root.join(distortion_next_to(file, root)?)).ok()?;
         let runs = self::runs(&text)?;
         let numbers: Vec<f64> = runs.iter().flat_map(|run| run.numbers.iter().copied()).collect();
         is_coefficients(numbers.len()).then_some(numbers)
@@ -136,7 +136,7 @@ fn distortion(runs: &[Run], (at, end): (usize, usize)) -> Option<Vec<f64>> {
 }
 
 /// The file next to it that is named after the distortion.
-fn distortion_beside(file: &Path, root: &Path) -> Option<std::path::PathBuf> {
+fn distortion_next_to(file: &Path, root: &Path) -> Option<std::path::PathBuf> {
     let folder = file.parent().unwrap_or(Path::new(""));
     let mut names: Vec<_> =
         std::fs::read_dir(root.join(folder)).ok()?.flatten().map(|entry| entry.file_name()).collect();

@@ -36,7 +36,7 @@ impl Format for Documents {
     }
 
     /// A JSON file next to poses is more often other poses than a camera.
-    fn is_beside(&self, file: &Path, _named: &Path) -> bool {
+    fn is_companion(&self, file: &Path, _named: &Path) -> bool {
         !folder::ending(file).starts_with("json")
     }
 

@@ -133,10 +133,10 @@ pub(super) fn sources(
             }
         };
         let samples = &recording.tracks[robot].samples;
-        let is_beside = |target: &Track| {
+        let is_companion = |target: &Track| {
             target.samples.len() == samples.len() && target.samples.iter().zip(samples).all(|(a, b)| a.place == b.place)
         };
-        let of_rows = matches!(source, Source::Track(i) if is_beside(&recording.tracks[i]));
+        let of_rows = matches!(source, Source::Track(i) if is_companion(&recording.tracks[i]));
         let is_in_step = |pairing: &Pairing| pairing.image_of.iter().enumerate().all(|(i, image)| *image == Some(i));
         // Two poses of one row are of one moment.
         for pairing in pairings(samples, images, LEAST_POSES).into_iter().filter(|it| !of_rows || is_in_step(it)) {
@@ -266,21 +266,21 @@ fn readings(
 ) -> Vec<Reading> {
     let Some(first) = track.samples.first() else { return Vec::new() };
     let (largest_length, largest_angle) = largest(track);
-    let Stated { length: said_length, angle: said_angle, rotation: said_rotation, .. } = &track.stated;
+    let Stated { length: stated_length, angle: stated_angle, rotation: stated_rotation, .. } = &track.stated;
     // A person knows better than a file.
-    let lengths = match (length, said_length) {
+    let lengths = match (length, stated_length) {
         (Some(unit), _) => vec![unit],
         (None, Some(known)) => vec![known.value],
         (None, None) => lengths_for(largest_length),
     };
-    let forms = match (rotation, said_rotation) {
+    let forms = match (rotation, stated_rotation) {
         (Some(form), _) => vec![form],
         (None, Some(known)) => known.value.clone(),
         (None, None) => RotationForm::all_for(&first.numbers),
     };
     let mut out = Vec::new();
     for form in forms {
-        let angles = match (angle, said_angle, form.has_angles()) {
+        let angles = match (angle, stated_angle, form.has_angles()) {
             (_, _, false) => vec![AngleUnit::Radian],
             (Some(unit), ..) => vec![unit],
             (None, Some(known), true) => vec![known.value],

@@ -48,11 +48,12 @@ const PRECISE: Noise = Noise { robot_m: 2e-5, robot_rad: 4e-5, ..REALISTIC };
 
 #[test]
 fn an_arm_whose_links_are_off_reaches_the_goal_by_corrected_commands() {
-    let (goal_m, mut told, mut all, mut beyond) = (3e-4, 0, 0, 0);
+    let (goal_m, mut by_arm, mut all, mut beyond) = (3e-4, 0, 0, 0);
     for (arm, mode) in
         [(CellArm::Ur5e, Mode::EyeInHand), (CellArm::Panda, Mode::EyeInHand), (CellArm::Xarm6, Mode::EyeToHand)]
     {
-        let mut cell = GuidedCell::new(CellSetup { untold: LINKS, noise: PRECISE, ..CellSetup::new(arm, mode, 3) });
+        let mut cell =
+            GuidedCell::new(CellSetup { not_determined: LINKS, noise: PRECISE, ..CellSetup::new(arm, mode, 3) });
         let run = cell.run(options(goal_m));
         let Ending::GoalReached { promised } = run.ending else { panic!("{arm:?} {mode:?}: {:?}", run.ending) };
         assert_eq!(
@@ -67,16 +68,16 @@ fn an_arm_whose_links_are_off_reaches_the_goal_by_corrected_commands() {
         let views = cell.observations.views.len();
         println!("{arm:?} {mode:?}: {views} views, {touches:?}, promised {promised:?}");
         assert!(views <= 25, "{arm:?} {mode:?}: {views} views");
-        told += run.steps.iter().filter(|step| matches!(step.why, Why::Gain { part: Part::Arm, .. })).count();
+        by_arm += run.steps.iter().filter(|step| matches!(step.why, Why::Gain { part: Part::Arm, .. })).count();
     }
-    assert!(told > 3, "{told} views were chosen by the errors of the arm");
+    assert!(by_arm > 3, "{by_arm} views were chosen by the errors of the arm");
     // One in twenty; five of thirty by chance once in seventy.
     assert!(all >= 20 && beyond <= 4, "{beyond} of {all} touches are farther off than was promised");
 }
 
 #[test]
 fn a_goal_below_what_the_arm_repeats_is_said_to_be() {
-    let setup = CellSetup { untold: LINKS, ..CellSetup::new(CellArm::Ur5e, Mode::EyeInHand, 3) };
+    let setup = CellSetup { not_determined: LINKS, ..CellSetup::new(CellArm::Ur5e, Mode::EyeInHand, 3) };
     let run = GuidedCell::new(setup).run(GuidedOptions { most_views: 12, ..options(5e-5) });
     let Ending::Repeatability { promised } = run.ending else { panic!("{:?}", run.ending) };
     assert!(promised.least_m > 5e-5 && promised.least_m < promised.error_m, "{promised:?}");

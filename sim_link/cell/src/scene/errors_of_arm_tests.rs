@@ -12,7 +12,7 @@ use handeye_geometry::frames::Pose;
 const LARGE: ArmErrorsSpec = ArmErrorsSpec { angle_deg: 1.0, length_mm: 5.0, compliance_deg: 0.5 };
 
 /// An arm on a slanted foot and with a tool.
-fn standing(arm: Arm, arm_errors: ArmErrorsSpec, seed: u64) -> ResolvedScene {
+fn resolved(arm: Arm, arm_errors: ArmErrorsSpec, seed: u64) -> ResolvedScene {
     let robot = RobotSpec { arm_errors, ..RobotSpec::default() };
     ResolvedScene {
         robot_errors: RobotErrors::new(&robot, &arm, seed),
@@ -97,7 +97,7 @@ fn levels_twice_as_large_put_the_tip_twice_as_far_away() {
 #[test]
 fn without_errors_every_arm_is_where_it_says() {
     for arm in arms() {
-        let scene = standing(arm, ArmErrorsSpec::NONE, 3);
+        let scene = resolved(arm, ArmErrorsSpec::NONE, 3);
         for joints in places(&scene.arm) {
             let (reported, real) = (scene.reported_tip(&joints).unwrap(), scene.true_tip(&joints, 0).unwrap());
             assert!((reported.isometry().to_homogeneous() - real.isometry().to_homogeneous()).amax() < 1e-12);
@@ -109,7 +109,7 @@ fn without_errors_every_arm_is_where_it_says() {
 #[test]
 fn the_true_tip_is_that_of_a_chain_in_which_each_joint_is_off() {
     for arm in arms() {
-        let scene = standing(arm, LARGE, 4);
+        let scene = resolved(arm, LARGE, 4);
         for joints in places(&scene.arm) {
             let frames = scene.arm.frames(&joints).unwrap();
             let down = scene.world_from_arm.rotation.inverse() * -Vector3::z();
@@ -216,7 +216,7 @@ fn a_level_arm_gives_way_downwards_and_a_hanging_one_not_at_all() {
     let scene = ResolvedScene {
         world_from_arm: Isometry3::identity(),
         connection_from_tip: Isometry3::identity(),
-        ..standing(planar(), errors, 2)
+        ..resolved(planar(), errors, 2)
     };
     let [_, second, third] = [0, 1, 2].map(|i| scene.robot_errors.joints[i].compliance_rad);
     let down = -Vector3::z();
@@ -240,7 +240,7 @@ fn the_share_of_gravity_is_how_fast_the_weights_sink_over_the_largest_and_never_
     // Half a step to either side: the third derivative times h²/24, and rounding over h.
     const STEP: f64 = 1e-5;
     for arm in arms() {
-        let scene = standing(arm, LARGE, 1);
+        let scene = resolved(arm, LARGE, 1);
         let down = scene.world_from_arm.rotation.inverse() * -Vector3::z();
         let weights = |joints: &JointValues| -> Vec<Vector3<f64>> {
             let frames = scene.arm.frames(joints).unwrap();
@@ -272,9 +272,9 @@ fn the_share_of_gravity_is_how_fast_the_weights_sink_over_the_largest_and_never_
 
 #[test]
 fn values_that_are_not_those_of_the_arm_are_refused() {
-    let scene = standing(PANDA.arm().unwrap(), LARGE, 1);
+    let scene = resolved(PANDA.arm().unwrap(), LARGE, 1);
     assert!(matches!(scene.true_tip(&JointValues::zeros(6), 0), Err(ArmError::WrongCount { got: 6, need: 7 })));
-    let scene = standing(XARM6_ON_TRACK.arm().unwrap(), LARGE, 1);
+    let scene = resolved(XARM6_ON_TRACK.arm().unwrap(), LARGE, 1);
     let joints = JointValues::from_fn(7, |i| if i == 2 { f64::NAN } else { 0.0 });
     assert!(matches!(scene.true_tip(&joints, 0), Err(ArmError::NotFinite { joint: 3 })));
 }

@@ -40,9 +40,9 @@ fn every_view_shows_the_whole_board_from_its_front_and_from_the_distance_asked_f
             let eye = target_from_camera.translation() - setup.target.centre().coords;
             let tilt = (-eye.z / eye.norm()).acos();
             // Aiming off the middle shifts both a little.
-            let aside = options.aim_m * std::f64::consts::SQRT_2;
-            assert!(eye.norm() > options.distance_m[0] - aside && eye.norm() < options.distance_m[1] + aside);
-            assert!(tilt < options.cone_rad + (aside / options.distance_m[0]).atan(), "{}°", tilt.to_degrees());
+            let sideways = options.aim_m * std::f64::consts::SQRT_2;
+            assert!(eye.norm() > options.distance_m[0] - sideways && eye.norm() < options.distance_m[1] + sideways);
+            assert!(tilt < options.cone_rad + (sideways / options.distance_m[0]).atan(), "{}°", tilt.to_degrees());
         }
     }
 }

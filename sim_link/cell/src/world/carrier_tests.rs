@@ -139,12 +139,12 @@ fn a_board_that_somebody_puts_elsewhere_goes_on_from_there() {
     let (mut unmoved, _) = world(BoardPath::Circle);
     run(&mut moved, sheet, 100);
     run(&mut unmoved, sheet, 100);
-    let aside = Vector3::new(0.2, -0.1, 0.05);
+    let sideways = Vector3::new(0.2, -0.1, 0.05);
     let mut pose = moved.tree.world_pose(sheet, Chain::Reported).expect("there");
-    pose.translation.vector += aside;
+    pose.translation.vector += sideways;
     moved.tree.set_world_pose(sheet, &pose).expect("there");
     for (a, b) in run(&mut moved, sheet, 200).iter().zip(run(&mut unmoved, sheet, 200)) {
-        assert!((a - b - aside).norm() < 1e-12, "{a} and {b}");
+        assert!((a - b - sideways).norm() < 1e-12, "{a} and {b}");
     }
 }
 

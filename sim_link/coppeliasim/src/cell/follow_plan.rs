@@ -64,7 +64,7 @@ struct Moving {
 }
 
 impl Moving {
-    fn standing(kinematics: &ArmKinematics, joints: JointValues) -> Self {
+    fn at_rest(kinematics: &ArmKinematics, joints: JointValues) -> Self {
         let base_from_tip = *kinematics.tip(&joints).isometry();
         let (velocity_m_s, turn_rad_s) = (Vector3::zeros(), Vector3::zeros());
         Self { joints, rates: JointValues::zeros(joints.len()), base_from_tip, velocity_m_s, turn_rad_s }
@@ -111,7 +111,7 @@ impl<'a> FollowPlan<'a> {
         if let Some(joint) = kinematics.arm().first_violation(&joints) {
             return Err(FollowEnd::JointLimit { joint: joint + 1 });
         }
-        let now = Moving::standing(kinematics, joints);
+        let now = Moving::at_rest(kinematics, joints);
         if !limits.workspace.contains(&now.base_from_tip.translation.vector) {
             return Err(FollowEnd::Workspace);
         }
@@ -146,7 +146,7 @@ impl<'a> FollowPlan<'a> {
 
     /// Reports that the arm is at rest after all, because it did not get its points for a while.
     pub fn stand(&mut self) {
-        self.now = Moving::standing(self.kinematics, self.now.joints);
+        self.now = Moving::at_rest(self.kinematics, self.now.joints);
     }
 
     /// The joints for the next pass [rad]: towards the goal for the time of this point, or to rest with `None`.

@@ -191,15 +191,15 @@ impl<'a> Way<'a> {
         match self {
             Self::Joints(way) => {
                 let still = JointValues::zeros(way.goal.len());
-                if let Ok(anew) = JointMotion::new(rest, &way.goal, &still, Some(&way.limits), Sync::Phase) {
-                    way.motion = anew;
+                if let Ok(again) = JointMotion::new(rest, &way.goal, &still, Some(&way.limits), Sync::Phase) {
+                    way.motion = again;
                 }
             }
             Self::Line(line) => {
                 let tip = line.kinematics.tip(joints);
                 let (goal, limits) = (line.goal.isometry(), Some(&line.limits));
-                if let Ok(anew) = motion::PoseMotion::new(tip.isometry(), goal, limits, None, Sync::Phase) {
-                    (line.motion, line.joints, line.astray) = (anew, *joints, None);
+                if let Ok(again) = motion::PoseMotion::new(tip.isometry(), goal, limits, None, Sync::Phase) {
+                    (line.motion, line.joints, line.astray) = (again, *joints, None);
                 }
             }
         }

@@ -265,9 +265,9 @@ fn the_arm_stands_the_same_for_a_pose_of_the_tip_from_wherever_it_came() {
     let mut goal = tip_pose(&mut bench);
     goal[2] -= 0.02;
     let rest: Vec<Vec<f64>> = [[0.04, 0.01, 0.0], [-0.03, 0.05, 0.06]]
-        .map(|aside| {
+        .map(|sideways| {
             let mut start = goal.clone();
-            start.iter_mut().zip(aside).for_each(|(at, by)| *at += by);
+            start.iter_mut().zip(sideways).for_each(|(at, by)| *at += by);
             for pose in [&start, &goal] {
                 let params = to_pose(&mut bench, pose, vec![]);
                 bench.call(A, "sim.moveToPose", vec![params]);

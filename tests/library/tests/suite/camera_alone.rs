@@ -113,7 +113,7 @@ fn a_few_wrong_corners_are_named_and_change_nothing() {
     let (calibration, expected) = (solved(&observations), solved(&without));
     for (i, view) in calibration.views.iter().enumerate() {
         let named: Vec<usize> = wrong.iter().filter(|(v, ..)| *v == i).map(|(_, index, _)| *index).collect();
-        assert_eq!((view.status, &view.corners_aside), (ViewStatus::Used, &named), "view {i}");
+        assert_eq!((view.status, &view.rejected_corners), (ViewStatus::Used, &named), "view {i}");
         assert_eq!(view.residuals.len(), GRID.len() - named.len());
     }
     for ((error, sigma), (expected, _)) in errors(&calibration).into_iter().zip(errors(&expected)) {
@@ -123,7 +123,7 @@ fn a_few_wrong_corners_are_named_and_change_nothing() {
     assert!(found(&observations, &calibration, FindingCode::OutlierCorners).is_some());
     let all = Options { keep_outliers: true, ..Options::default() };
     let kept = fit_with(&observations, Method::Joint, all, &CancelToken::default()).expect("calibrates");
-    assert!(kept.views.iter().all(|view| view.corners_aside.is_empty()));
+    assert!(kept.views.iter().all(|view| view.rejected_corners.is_empty()));
     assert!(kept.rms_px > Some(5.0), "{:?}", kept.rms_px);
 }
 

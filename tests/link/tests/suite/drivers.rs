@@ -479,10 +479,10 @@ mod slow {
                         let began = Instant::now();
                         let report = conformance::run(&spec, &options, &CancelToken::default()).unwrap();
                         let text = report.text();
-                        let is_told = !report.passed && text.contains(says);
+                        let is_reported = !report.passed && text.contains(says);
                         let is_still = allow_motion || !mark.exists();
                         let is_quick = began.elapsed() < Duration::from_mins(1);
-                        if !(is_told && is_still && is_quick) {
+                        if !(is_reported && is_still && is_quick) {
                             let what =
                                 format!("{fault} (still {is_still}, {:?}): wanted {says}\n{text}", began.elapsed());
                             failures.lock().unwrap().push(what);

@@ -35,7 +35,7 @@ pub fn weight(row: &CaptureRow) -> u8 {
         Detected::NoBoard => return 8,
         Detected::Board | Detected::NotYet => {}
     }
-    if row.is_aside() {
+    if row.is_rejected() {
         return 8;
     }
     let has = |code, weight| if row.found.contains(&code) { weight } else { 0 };
@@ -46,9 +46,9 @@ pub fn weight(row: &CaptureRow) -> u8 {
 }
 
 /// Why the estimate excluded a capture, and what to do; `None` if it did not.
-fn why_aside(row: &CaptureRow, language: Language) -> Option<String> {
-    let aside = row.aside.filter(|_| row.is_aside())?;
-    let why = match aside.board_off {
+fn why_rejected(row: &CaptureRow, language: Language) -> Option<String> {
+    let rejected = row.rejected.filter(|_| row.is_rejected())?;
+    let why = match rejected.board_off {
         Some((mm, deg)) => text!(
             "It does not fit the other captures, so the answer is without it: its board is {mm} mm and {deg}° from where \
              they put it. The arm may still have moved, the board may have been touched, or the pose is of another \
@@ -67,13 +67,14 @@ fn why_aside(row: &CaptureRow, language: Language) -> Option<String> {
 }
 
 /// The same for single corners.
-fn why_corners_aside(row: &CaptureRow, language: Language) -> Option<String> {
+fn why_corners_rejected(row: &CaptureRow, language: Language) -> Option<String> {
     let why = text!(
         "Corners of this image that are far from where the rest of it puts them, and which the answer is without: \
          {count}. Look there for reflections and things in front of the board.",
-        count = row.corners_aside
+        count = row.rejected_corners
     );
-    (row.corners_aside > 0 && !row.excluded && !row.verifies() && !row.is_aside()).then(|| why.in_language(language))
+    (row.rejected_corners > 0 && !row.excluded && !row.verifies() && !row.is_rejected())
+        .then(|| why.in_language(language))
 }
 
 /// The remarks on a capture, the worst first.
@@ -110,14 +111,14 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
         }
         Detected::Board => {}
     }
-    if let Some(why) = why_aside(row, language) {
+    if let Some(why) = why_rejected(row, language) {
         flag(Some(Tone::Warning), tr!(language, "Outlier"), why);
     }
     if let (Some(rms_px), Some(line_px)) = (row.rms_px, circumstances.outlier_line_px)
         && rms_px > line_px
         && !row.verifies()
         && !row.excluded
-        && !row.is_aside()
+        && !row.is_rejected()
     {
         let (rms, line) = (format!("{rms_px:.3}"), format!("{line_px:.3}"));
         let why = text!(
@@ -151,7 +152,7 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
         );
         flag(Some(Tone::Busy), tr!(language, "Influential"), why.to_owned());
     }
-    if let Some(why) = why_corners_aside(row, language) {
+    if let Some(why) = why_corners_rejected(row, language) {
         flag(Some(Tone::Busy), tr!(language, "Outlier corners"), why);
     }
     if row.excluded {

@@ -13,7 +13,7 @@ use crate::capture::rows::{self, CaptureTable};
 use crate::guided::section::{begin_ui, is_wanted, progress_ui};
 use crate::live::textures::Thumbnails;
 use crate::shell::asked::asked_ui;
-use crate::shell::capturing::stands_over_image;
+use crate::shell::capturing::covers_image;
 use crate::shell::capturing::waiting;
 use crate::shell::reasons;
 use crate::shell::sequence;
@@ -224,9 +224,9 @@ fn selected_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Ou
 
 /// How many captures there are of each kind that occurs.
 fn counted(table: &CaptureTable, language: Language) -> String {
-    let (fit, aside) = (table.count(CaptureUse::Fit), table.count(CaptureUse::Rejected));
+    let (fit, rejected) = (table.count(CaptureUse::Fit), table.count(CaptureUse::Rejected));
     let others = [
-        (aside, if aside == 1 { tr!(language, "outlier") } else { tr!(language, "outliers") }),
+        (rejected, if rejected == 1 { tr!(language, "outlier") } else { tr!(language, "outliers") }),
         (table.count(CaptureUse::Verification), tr!(language, "for verification")),
         (table.count(CaptureUse::Excluded), tr!(language, "excluded")),
     ];
@@ -237,7 +237,7 @@ fn counted(table: &CaptureTable, language: Language) -> String {
 
 /// Why the last capture was refused, once the image no longer shows it.
 fn kept_refusal(model: &Model) -> Option<&CaptureRefused> {
-    model.refused.as_ref().filter(|_| !stands_over_image(model))
+    model.refused.as_ref().filter(|_| !covers_image(model))
 }
 
 /// How the capture goes, or why the last one was refused.

@@ -46,7 +46,7 @@ pub fn row_ui(
     if selected {
         ui.painter().rect_filled(place, CornerRadius::ZERO, ui.visuals().selection.bg_fill);
     } else {
-        let plain = row.is_aside().then(|| palette.tinted(Tone::Warning));
+        let plain = row.is_rejected().then(|| palette.tinted(Tone::Warning));
         let fill = if response.hovered() {
             Some(plain.unwrap_or(palette.card).lerp_to_gamma(palette.text, 0.05))
         } else {
@@ -70,7 +70,7 @@ pub fn row_ui(
             Column::Name => title(ui, row, cell),
             Column::Use => use_ui(ui, row, cell, language, outbox),
             Column::Purpose => {
-                let (words, colour) = if row.is_aside() {
+                let (words, colour) = if row.is_rejected() {
                     (tr!(language, "outlier"), palette.warning)
                 } else {
                     let words = if row.verifies() { tr!(language, "verify") } else { tr!(language, "fit") };
@@ -105,10 +105,10 @@ fn hidden(row: &CaptureRow, width: f32, language: Language) -> Option<String> {
 }
 
 fn spoken(row: &CaptureRow, name: &str, language: Language) -> String {
-    let aside = if row.is_aside() { format!(", {}", tr!(language, "outlier")) } else { String::new() };
+    let rejected = if row.is_rejected() { format!(", {}", tr!(language, "outlier")) } else { String::new() };
     match row.rms_px {
-        Some(rms_px) => format!("{name}{aside}, {rms_px:.3} px"),
-        None => format!("{name}{aside}"),
+        Some(rms_px) => format!("{name}{rejected}, {rms_px:.3} px"),
+        None => format!("{name}{rejected}"),
     }
 }
 

@@ -172,8 +172,8 @@ fn remarks_say_what_is_wrong_with_a_capture() {
 fn a_capture_that_was_set_aside_says_so_with_how_far_it_is_off_and_what_to_do() {
     let model = sample::with_an_outlier();
     let table = rows::table(&egui::Context::default(), &model);
-    let aside = table.row(sample::OUTLIER).expect("a row");
-    let flags = flags::flags(aside, flags::Circumstances::default(), Language::English);
+    let rejected = table.row(sample::OUTLIER).expect("a row");
+    let flags = flags::flags(rejected, flags::Circumstances::default(), Language::English);
     let why = &flags.first().expect("a remark").why;
     assert!(why.contains("12.30 mm and 1.500°") && why.contains("keep all views"), "{why}");
     let first = sorted(&table.rows, Sort { column: Column::Flags, descending: false })[0];
@@ -191,7 +191,7 @@ fn a_capture_that_was_set_aside_says_so_with_how_far_it_is_off_and_what_to_do() 
 fn corners_that_were_set_aside_are_counted() {
     let mut model = sample::solved();
     let mut solved = handeye_workbench::model::Solved::clone(model.solve.current().expect("solved"));
-    solved.calibration.views[1].corners_aside = vec![4, 5, 6];
+    solved.calibration.views[1].rejected_corners = vec![4, 5, 6];
     model.solve.solved = Some(Arc::new(solved));
     let table = rows::table(&egui::Context::default(), &model);
     let flags = flags::flags(&table.rows[1], flags::Circumstances::default(), Language::English);

@@ -205,10 +205,10 @@ fn field_ui(ui: &mut Ui, language: Language, of: &str, field: &Field, values: &m
         FieldKind::Text(example) => text_ui(ui, of, name, example, &mut now),
         FieldKind::Word(words) => {
             form::row_ui(ui, name, |ui| {
-                let not_said = tr!(language, "not stated");
-                let shown = if now.is_empty() { not_said } else { before.as_str() };
+                let not_stated = tr!(language, "not stated");
+                let shown = if now.is_empty() { not_stated } else { before.as_str() };
                 let combo = ComboBox::from_id_salt((of, field.option)).selected_text(shown).show_ui(ui, |ui| {
-                    ui.selectable_value(&mut now, String::new(), not_said);
+                    ui.selectable_value(&mut now, String::new(), not_stated);
                     for word in words() {
                         ui.selectable_value(&mut now, word.to_owned(), word);
                     }

@@ -10,7 +10,7 @@ use handeye_session::CaptureId;
 
 use super::Shown;
 use crate::capture::rows;
-use crate::shell::capturing::{stands_over_image, waiting};
+use crate::shell::capturing::{covers_image, waiting};
 use crate::status::STALE_AFTER_S;
 use crate::style::marks::{self, Marks};
 use crate::style::parts;
@@ -132,7 +132,7 @@ pub fn capture_ui(ui: &mut Ui, model: &Model, room: Rect, in_words: bool, outbox
                 outbox.send(capture::Command::Cancel);
             }
         });
-    } else if let Some(refused) = model.refused.as_ref().filter(|_| stands_over_image(model)) {
+    } else if let Some(refused) = model.refused.as_ref().filter(|_| covers_image(model)) {
         let words = text!("No capture: {why}", why = refused.why.clone()).in_language(language);
         plate_ui(ui, room, Tone::Warning, &words, |_| {});
     }

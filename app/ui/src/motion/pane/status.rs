@@ -54,7 +54,7 @@ pub fn status_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
 /// Why the arm did not do what was requested last.
 pub fn refusal_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
-    let Some(message) = model.messages.standing_in(Pane::Jog) else { return };
+    let Some(message) = model.messages.shown_in(Pane::Jog) else { return };
     let tone = if message.severity == Severity::Error { Tone::Bad } else { Tone::Warning };
     let reported = message.text.in_language(language);
     let close = tr!(language, "Dismiss the message");

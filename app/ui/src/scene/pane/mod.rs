@@ -122,7 +122,7 @@ fn room_ui(ui: &mut Ui, room: Rect, model: &Model, table: &CaptureTable, outbox:
     response.widget_info(|| WidgetInfo::labeled(WidgetType::Image, true, tr!(language, "The cell in 3D")));
     let key = ui.id().with("pointed at");
     let pointed: Option<CaptureId> = parts::remembered(ui, key);
-    let eye = Eye::new(&model.scene, crate::keep_out::editor::room_beside(ui, room));
+    let eye = Eye::new(&model.scene, crate::keep_out::editor::room_next_to(ui, room));
     let mut canvas = Canvas::new(eye, Palette::of(ui).ink);
     let drawn = content::draw(&mut canvas, ui, model, table, pointed);
     let is_drawing = crate::keep_out::editor::is_drawing(ui);

@@ -140,7 +140,7 @@ pub fn plot_rect(room: Rect) -> Rect {
 }
 
 /// The room next to the name of the horizontal axis.
-pub fn beside_name(plot: Rect) -> Rect {
+pub fn next_to_name(plot: Rect) -> Rect {
     let bottom = plot.bottom() + BOTTOM;
     Rect::from_x_y_ranges(plot.x_range(), bottom - CAPTION - 4.0..=bottom)
 }

@@ -123,7 +123,7 @@ impl Bars {
         let ticks: Vec<(f32, String)> =
             table.rows.iter().enumerate().map(|(index, row)| (middle(index), row.id.to_string())).collect();
         axes::axes_ui(ui, plot, scale, self.y_name, tr!(language, "Capture"), &ticks);
-        let beside = UiBuilder::new().max_rect(axes::beside_name(plot)).layout(Layout::left_to_right(Align::Center));
+        let beside = UiBuilder::new().max_rect(axes::next_to_name(plot)).layout(Layout::left_to_right(Align::Center));
         ui.scope_builder(beside, |ui| legend::legend_ui(ui, table, language));
         let response = ui.interact(plot, ui.id().with(self.name), Sense::click());
         response.widget_info(|| WidgetInfo::labeled(WidgetType::Image, true, self.y_name));
@@ -160,7 +160,7 @@ impl Bars {
     fn colour(&self, ui: &Ui, model: &Model, row: &CaptureRow, value: f64, is_pointed: bool) -> Color32 {
         let palette = Palette::of(ui);
         let is_above = self.unit == "px" && model.outlier_line_px.is_some_and(|line_px| value > line_px);
-        let colour = if row.is_aside() || (is_above && !row.excluded && !row.verifies()) {
+        let colour = if row.is_rejected() || (is_above && !row.excluded && !row.verifies()) {
             palette.warning
         } else {
             marks::of_capture(Marks::of(ui), row.excluded, row.verifies())
@@ -174,7 +174,7 @@ impl Bars {
         let what = match (row.excluded, row.verifies()) {
             (true, _) => tr!(language, "excluded"),
             (false, true) => tr!(language, "for verification: error of the prediction"),
-            (false, false) if row.is_aside() => tr!(language, "outlier"),
+            (false, false) if row.is_rejected() => tr!(language, "outlier"),
             (false, false) => tr!(language, "in the fit"),
         };
         format!("{}\n{} {value}\n{what}", text!("Capture {name}", name = row.title()).in_language(language), self.name)

@@ -185,8 +185,8 @@ fn reach_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Outbox) ->
 /// The stated accuracy of the robot, and a field to change it.
 fn robot_accuracy_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
-    let said_mm = model.document().meta.robot_accuracy_mm;
-    let mut accuracy_mm = said_mm.unwrap_or(0.0);
+    let stated_mm = model.document().meta.robot_accuracy_mm;
+    let mut accuracy_mm = stated_mm.unwrap_or(0.0);
     ui.horizontal_wrapped(|ui| {
         let name = ui.label(tr!(language, "Accuracy of the robot"));
         let meaning = tr!(
@@ -207,7 +207,7 @@ fn robot_accuracy_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         // Every value during a drag would be a change of the session.
         if response.drag_stopped() || (response.changed() && !response.dragged()) {
             let known = Some(accuracy_mm).filter(|mm| mm >= ROBOT_ACCURACY_MM.start());
-            if known != said_mm {
+            if known != stated_mm {
                 outbox.send(session::Command::SetRobotAccuracy(known));
             }
         }

@@ -228,7 +228,7 @@ fn with_everything_found(calibration: &mut handeye_estimate::diagnose::Calibrati
         view.status = ViewStatus::Outlier;
         view.distance = Some(Distance { of_limit: 4.0, metres: 8e-3, radians: 0.02 });
     }
-    calibration.views[3].corners_aside = vec![1, 2];
+    calibration.views[3].rejected_corners = vec![1, 2];
     calibration.views[4].quarter_turns = 2;
     let joint = calibration.joint.as_mut().expect("a joint estimate");
     joint.shape = Some(ShapeEstimate {

@@ -43,7 +43,7 @@ pub fn planned_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     if parts::gated_ui(ui, blocked(model), button).on_hover_text(what).clicked() {
         outbox.send(taught::Command::VerifyAtPlanned);
     }
-    if let Some(message) = model.messages.standing_in(Pane::Verify) {
+    if let Some(message) = model.messages.shown_in(Pane::Verify) {
         parts::notice_ui(ui, Tone::Warning, &message.text.in_language(language), |_| ());
     }
     if let Some(sequence) = model.sequence.as_ref().filter(|sequence| sequence.is_planned()) {

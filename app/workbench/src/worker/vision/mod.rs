@@ -243,7 +243,7 @@ impl Vision {
     fn measure(&mut self) -> Result<(), Ended> {
         let complete = self.capture.as_ref().filter(|capture| capture.sequence.is_complete());
         let Some(number) = complete.map(|capture| capture.sequence.number()) else { return Ok(()) };
-        self.tell(CaptureWait::Measuring);
+        self.report(CaptureWait::Measuring);
         let measured = self.capture.as_ref().and_then(|capture| capture.sequence.measure(&self.shutdown));
         // The search for dots or markers may have taken seconds: requests made meanwhile come first.
         self.take_up_tasks()?;
@@ -257,7 +257,7 @@ impl Vision {
                 Ok(())
             }
             Some(Ok(measured)) => {
-                self.tell(CaptureWait::Saving);
+                self.report(CaptureWait::Saving);
                 self.capture = None;
                 self.hand_over(measured)
             }
@@ -282,13 +282,13 @@ impl Vision {
     /// Reports what the capture waits for, or that there is none, if that has changed.
     fn tell_progress(&mut self) {
         match self.capture.as_ref().map(|capture| capture.sequence.state()) {
-            Some(Ok(wait)) => self.tell(wait),
+            Some(Ok(wait)) => self.report(wait),
             Some(Err(why)) => self.refuse(why),
             None => {}
         }
     }
 
-    fn tell(&mut self, wait: CaptureWait) {
+    fn report(&mut self, wait: CaptureWait) {
         if let Some(capture) = self.capture.as_mut().filter(|capture| capture.reported != Some(wait)) {
             capture.reported = Some(wait);
             let number = capture.sequence.number();

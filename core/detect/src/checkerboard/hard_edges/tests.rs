@@ -36,8 +36,8 @@ impl Drawn {
             let axis = Vector3::new(towards.cos(), towards.sin(), 0.0);
             let tilt = UnitQuaternion::from_scaled_axis(axis * random.random_range(tilt.clone()).to_radians());
             let turn = tilt * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll);
-            let aside = Vector3::new(random.random_range(-0.1..0.1), random.random_range(-0.08..0.08), 0.0);
-            let at = Translation3::from(aside + Vector3::z() * random.random_range(away.clone()));
+            let lateral = Vector3::new(random.random_range(-0.1..0.1), random.random_range(-0.08..0.08), 0.0);
+            let at = Translation3::from(lateral + Vector3::z() * random.random_range(away.clone()));
             let middle = Translation3::new(-4.5 * GRID.square_m, -3.0 * GRID.square_m, 0.0);
             let pose = Isometry3::from_parts(at, turn) * middle;
             let column = |i: usize| pose.rotation.to_rotation_matrix().matrix().column(i).into_owned() * GRID.square_m;

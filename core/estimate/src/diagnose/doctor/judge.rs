@@ -111,7 +111,7 @@ pub(super) fn judge(model: &Model<'_>, state: &State, before: &Fit, candidate: C
     let lens = model.sight.lens_count();
     match &candidate {
         Candidate::Effect(effect) => next.effects.push(*effect),
-        Candidate::Views(views) => next.aside.extend(views),
+        Candidate::Views(views) => next.rejected.extend(views),
     }
     let fit = model.fit(&next, before.levels)?;
     let (weight, numbers, sigma, ln_alternatives);
@@ -163,7 +163,7 @@ pub(super) fn confirm(model: &Model<'_>, before: &Fit, judged: &mut Judged) {
     }
     let Candidate::Effect(effect) = judged.candidate else { return };
     judged.significant &= match (effect, model.arm()) {
-        (Effect::Scale, Some(arm)) => arm.beside_another_size,
+        (Effect::Scale, Some(arm)) => arm.with_another_size,
         (Effect::Scale, None) | (Effect::Joint(_), Some(_)) | (Effect::BoardMoved(_) | Effect::CameraMoved(_), _) => {
             judged.significant && is_more_than_a_field(model, judged, effect)
         }
@@ -189,7 +189,7 @@ fn least_freedom(fit: &Fit, views: &[usize]) -> Option<f64> {
 fn stand_apart(judged: &Judged, views: &[usize]) -> bool {
     let fit = &judged.fit;
     let squared = |view: usize| {
-        let outside = judged.state.aside.contains(&view);
+        let outside = judged.state.rejected.contains(&view);
         if outside { fit.wald_of_views(&[view]) } else { view_score(fit, view) }.unwrap_or(0.0)
     };
     let squared: Vec<f64> = (0..fit.residuals.len()).map(squared).collect();
@@ -243,7 +243,7 @@ pub(super) fn moved_m(model: &Model<'_>, effect: Effect, numbers: &[f64]) -> f64
 
 /// Views left out of the fit, a fifth at a time. The noise levels stay.
 fn predicted(model: &Model<'_>, with: &State, fit: &Fit) -> Option<HeldOut> {
-    let inside: Vec<usize> = (0..model.rows.len()).filter(|i| !with.aside.contains(i)).collect();
+    let inside: Vec<usize> = (0..model.rows.len()).filter(|i| !with.rejected.contains(i)).collect();
     let normal = inverse(&fit.covariance)?;
     let right = &normal * &fit.theta;
     let (mut squares, mut scores) = (0.0, Vec::with_capacity(inside.len()));

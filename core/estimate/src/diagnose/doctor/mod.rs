@@ -198,15 +198,15 @@ fn examine(
         *stated = stated_uncertainty::stated_uncertainty(&selection, calibration);
     }
     diagnosis.findings.extend(fine.iter().filter(|h| h.accepted).map(words::finding_of));
-    let beside = fine.iter().any(|h| h.accepted && !h.applied);
+    let others = fine.iter().any(|h| h.accepted && !h.applied);
     // Where nothing else was found that is the noise that the answer states: one report has one number for it.
-    let (robot_m, robot_rad) = match noise.filter(|_| !beside) {
+    let (robot_m, robot_rad) = match noise.filter(|_| !others) {
         // Pose-dependent error is part of the robot's error as much as scatter is.
         Some(noise) => (noise.robot_m.hypot(noise.field_m), noise.robot_rad.hypot(noise.field_rad)),
         None => selection.fit.robot_sigma(),
     };
     if robot_m > PLAUSIBLE.0 || robot_rad > PLAUSIBLE.1 {
-        diagnosis.findings.push(words::implausible(robot_m, robot_rad, beside));
+        diagnosis.findings.push(words::implausible(robot_m, robot_rad, others));
     }
     // What was not accepted is listed by its weight.
     let gross = std::mem::take(&mut diagnosis.hypotheses);

@@ -87,12 +87,12 @@ pub(super) struct KnownArm {
     /// The errors at which the equations are linear, without their field.
     pub errors: ArmErrors,
     /// Whether the joint estimate, which weighs what arms and what sizes are likely, also estimates another size of the target.
-    pub beside_another_size: bool,
+    pub with_another_size: bool,
 }
 
 impl From<&ArmFit> for KnownArm {
     fn from(fit: &ArmFit) -> Self {
-        Self { errors: fit.errors.clone().with_field(None), beside_another_size: fit.beside.free.scale }
+        Self { errors: fit.errors.clone().with_field(None), with_another_size: fit.others.free.scale }
     }
 }
 
@@ -119,7 +119,7 @@ impl Levels {
 pub(super) struct State {
     pub effects: Vec<Effect>,
     /// Outlier views.
-    pub aside: Vec<usize>,
+    pub rejected: Vec<usize>,
 }
 
 /// The result of a fit.
@@ -331,7 +331,7 @@ impl<'a> Model<'a> {
     /// Noise levels and unknowns of a state. `None` when the views leave something open.
     pub fn fit(&self, state: &State, start: Levels) -> Option<Fit> {
         let width = self.width(state);
-        let inside: Vec<usize> = (0..self.rows.len()).filter(|i| !state.aside.contains(i)).collect();
+        let inside: Vec<usize> = (0..self.rows.len()).filter(|i| !state.rejected.contains(i)).collect();
         if 6 * inside.len() <= width - self.random() {
             return None;
         }

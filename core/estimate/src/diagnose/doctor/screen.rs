@@ -34,7 +34,7 @@ pub(super) fn screened(model: &Model<'_>, state: &State, fit: &Fit, room: usize)
         let taken = |e: &Effect| state.effects.contains(e);
         let joints = (0..model.sight.joints()).map(Effect::Joint).filter_map(|e| {
             let mut score = Score::new(1, fit.width());
-            (0..count).filter(|i| !state.aside.contains(i)).for_each(|i| score.add(fit, i, &e.columns(model, i)));
+            (0..count).filter(|i| !state.rejected.contains(i)).for_each(|i| score.add(fit, i, &e.columns(model, i)));
             Some((e, score.statistic(fit)?))
         });
         for family in [
@@ -48,7 +48,7 @@ pub(super) fn screened(model: &Model<'_>, state: &State, fit: &Fit, room: usize)
     }
     if room > 0 {
         let worst = (0..count)
-            .filter(|i| !state.aside.contains(i))
+            .filter(|i| !state.rejected.contains(i))
             .filter_map(|i| Some((i, view_score(fit, i)?)))
             .max_by(|a, b| a.1.total_cmp(&b.1));
         found.extend(worst.map(|(i, _)| Candidate::Views(vec![i])));
@@ -96,7 +96,7 @@ fn moves(model: &Model<'_>, state: &State, fit: &Fit, of: fn(usize) -> Effect) -
     let mut score = Score::new(6, fit.width());
     let mut found = Vec::new();
     for from in (2..count).rev() {
-        if !state.aside.contains(&from) {
+        if !state.rejected.contains(&from) {
             score.add(fit, from, &of(from).columns(model, from));
         }
         if from + 2 <= count {

@@ -57,18 +57,19 @@ pub(super) fn select<'a>(
     work: &Work<'_>,
 ) -> Option<Selection<'a>> {
     // The errors of an arm that is known leave nothing to a field, except where the joint estimate has one in addition.
-    let is_told_by_arm = arm.is_some_and(|arm| arm.errors.field().is_none());
+    let is_shown_by_arm = arm.is_some_and(|arm| arm.errors.field().is_none());
     let poses = sight.views.iter().map(|view| &view.base_from_tip);
-    let places = if is_told_by_arm { None } else { Places::for_field(poses) };
+    let places = if is_shown_by_arm { None } else { Places::for_field(poses) };
     let most_work = if arm.is_some() { MOST_WORK_WITH_ARM } else { MOST_WORK };
     let mut model = Model::new(sight, start.solution, places, arm.map(KnownArm::from));
     let far: Vec<usize> = (0..sight.views.len()).filter(|i| start.misfit_m[*i] > FAR * start.median_m).collect();
-    let most_aside = (MOST_ASIDE * sight.views.len() as f64) as usize;
+    let most_outliers = (MOST_ASIDE * sight.views.len() as f64) as usize;
     let noise_m = start.median_m / 3.0;
     let mut levels = Levels::even([noise_m, noise_m / sight.target.distance_m.max(0.01)].map(|sigma| sigma.powi(2)));
     // The majority determines where the equations are made linear; with many far views there is none, and all are
     // taken.
-    let majority = State { effects: Vec::new(), aside: if far.len() <= most_aside { far.clone() } else { Vec::new() } };
+    let majority =
+        State { effects: Vec::new(), rejected: if far.len() <= most_outliers { far.clone() } else { Vec::new() } };
     for _ in 0..ROUNDS {
         let fit = model.fit(&majority, levels)?;
         levels = fit.levels;
@@ -85,8 +86,8 @@ pub(super) fn select<'a>(
         if work.is_cancelled() {
             return None;
         }
-        let room = most_aside.saturating_sub(state.aside.len());
-        let together: Vec<usize> = far.iter().copied().filter(|i| !state.aside.contains(i)).collect();
+        let room = most_outliers.saturating_sub(state.rejected.len());
+        let together: Vec<usize> = far.iter().copied().filter(|i| !state.rejected.contains(i)).collect();
         let mut candidates = screened(&model, &state, &fit, room);
         if (2..=room.min(MOST_TOGETHER)).contains(&together.len()) {
             candidates.push(Candidate::Views(together));

@@ -26,7 +26,7 @@ pub(super) fn stated_uncertainty(selection: &Selection<'_>, calibration: &estima
     let counted = |effect: Effect| counts_on(calibration, effect);
     let out: Vec<usize> =
         (0..model.sight.views.len()).filter(|i| is_out(calibration, &model.sight.views[*i].name)).collect();
-    let mut with = State { effects: Vec::new(), aside: out };
+    let mut with = State { effects: Vec::new(), rejected: out };
     let (mut missed, mut missed_more_than_size) = (false, false);
     for judged in &selection.taken {
         match &judged.candidate {
@@ -38,10 +38,10 @@ pub(super) fn stated_uncertainty(selection: &Selection<'_>, calibration: &estima
                 missed_more_than_size |= is_missed && *effect != Effect::Scale;
             }
             Candidate::Views(views) => {
-                let more: Vec<usize> = views.iter().copied().filter(|i| !with.aside.contains(i)).collect();
+                let more: Vec<usize> = views.iter().copied().filter(|i| !with.rejected.contains(i)).collect();
                 missed |= !more.is_empty();
                 missed_more_than_size |= !more.is_empty();
-                with.aside.extend(more);
+                with.rejected.extend(more);
             }
         }
     }
@@ -113,7 +113,7 @@ fn counts_on(calibration: &estimate::Fit, effect: Effect) -> bool {
     };
     match effect {
         Effect::Warp => joint.free.warp,
-        Effect::Scale => joint.free.scale || calibration.arm().is_some_and(|arm| arm.beside.free.scale),
+        Effect::Scale => joint.free.scale || calibration.arm().is_some_and(|arm| arm.others.free.scale),
         // Its stated error includes the zeros of the arm.
         Effect::Joint(_) => calibration.arm().is_some(),
         Effect::Lens | Effect::Centre | Effect::BoardMoved(_) | Effect::CameraMoved(_) => false,

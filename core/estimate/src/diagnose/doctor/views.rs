@@ -361,14 +361,14 @@ fn fit_all(views: &[Corners], target: &TargetSpec, camera: &Intrinsics) -> Vec<O
     let limit = (WRONG_SIGMAS * typical / std::f64::consts::SQRT_2).max(WRONG_PX);
     let points = target.points();
     for fit in fits.iter_mut().flatten() {
-        set_wrong_aside(fit, limit, &points, camera, &solve);
+        reject_wrong(fit, limit, &points, camera, &solve);
     }
     fits
 }
 
 /// Leaves the worst corners of a view out until none is beyond the limit. A view with too many of them is left whole: it
 /// is wrong as such.
-fn set_wrong_aside(
+fn reject_wrong(
     fit: &mut Fit,
     limit_px: f64,
     points: &[Point3<f64>],

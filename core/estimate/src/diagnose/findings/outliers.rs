@@ -38,12 +38,12 @@ fn with_views(finding: Finding, names: &[String]) -> Finding {
 }
 
 fn outliers(calibration: &Calibration) -> Option<Finding> {
-    let aside = || calibration.views.iter().filter(|view| view.status == ViewStatus::Outlier);
-    let names = named(aside());
+    let rejected = || calibration.views.iter().filter(|view| view.status == ViewStatus::Outlier);
+    let names = named(rejected());
     if names.is_empty() {
         return None;
     }
-    let worst = aside()
+    let worst = rejected()
         .filter_map(|view| view.distance)
         .filter(|d| d.metres.is_finite())
         .max_by(|a, b| a.of_limit.total_cmp(&b.of_limit));
@@ -77,11 +77,11 @@ fn outliers(calibration: &Calibration) -> Option<Finding> {
 }
 
 fn corners(calibration: &Calibration) -> Option<Finding> {
-    let names = named(calibration.views.iter().filter(|view| !view.corners_aside.is_empty()));
+    let names = named(calibration.views.iter().filter(|view| !view.rejected_corners.is_empty()));
     if names.is_empty() {
         return None;
     }
-    let count: usize = calibration.views.iter().map(|view| view.corners_aside.len()).sum();
+    let count: usize = calibration.views.iter().map(|view| view.rejected_corners.len()).sum();
     let what = text!(
         "{count} outlier {count|corner|corners}, far from where the rest of the view puts {count|it|them}: in {list}.",
         count = count,

@@ -173,10 +173,10 @@ fn one_wrong_robot_pose_is_named_by_correction_and_influence() {
     }
     assert!(find(&found, FindingCode::LargeResidual).is_none(), "its corners are as good as the others'");
     let found = of_trial(&t, false, &FindingOptions::default());
-    let aside = find(&found, FindingCode::OutlierView).expect("outlier");
-    assert_eq!(aside.views, ["007"]);
+    let rejected = find(&found, FindingCode::OutlierView).expect("outlier");
+    assert_eq!(rejected.views, ["007"]);
     // PnP knows the tilt of one view to a tenth of a degree.
-    assert!((aside.value("angle").expect("stated") - 0.5).abs() < 0.3, "{aside}");
+    assert!((rejected.value("angle").expect("stated") - 0.5).abs() < 0.3, "{rejected}");
     assert!(find(&found, FindingCode::LargeCorrection).is_none(), "the answer is without it");
 }
 

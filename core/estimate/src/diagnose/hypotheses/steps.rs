@@ -65,8 +65,8 @@ pub fn explains<H: Hypothesis>(
     let repaired = own_row_wrong.iter().filter(|view| moved(view) && !still_wrong.contains(view)).count();
     // An image for which the table has no pose cannot be repaired.
     let has_row = |view: &usize| stepped.pair(*view).is_some();
-    let paired_anew = judged((0..stepped.views()).collect()).iter().filter(|v| moved(v) && has_row(v)).count();
-    without >= 2 && 3 * still_wrong.len() <= without && repaired >= 2 && 3 * repaired >= 2 * paired_anew
+    let paired_again = judged((0..stepped.views()).collect()).iter().filter(|v| moved(v) && has_row(v)).count();
+    without >= 2 && 3 * still_wrong.len() <= without && repaired >= 2 && 3 * repaired >= 2 * paired_again
 }
 
 /// The step that lets most views agree with the solution of one side of the session, by the hypotheses that all views belong

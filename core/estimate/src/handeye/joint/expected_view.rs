@@ -18,7 +18,7 @@ use super::variance::levels_of_effects;
 use super::view_block::{Layout, PixelWeights, ViewBlock, prior_weight};
 use super::{Free, Noise, SIZE_SIGMA};
 use crate::Fit;
-use crate::arm_fit::BesideArm;
+use crate::arm_fit::OtherEstimates;
 use crate::handeye::{HandEye, Mode};
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
@@ -100,7 +100,7 @@ impl ViewModel {
     /// The same with the errors of the arm among the unknowns; `None` where the calibration does not have them, see [`Fit::arm`].
     pub fn of_arm(calibration: &Fit, target: &TargetSpec) -> Option<Self> {
         let arm = calibration.arm()?;
-        let BesideArm { intrinsics, shape, free, .. } = arm.beside.clone();
+        let OtherEstimates { intrinsics, shape, free, .. } = arm.others.clone();
         let free = Free { depth: false, ..free };
         let layout =
             Layout { form: free.form().count(&intrinsics), field: arm.errors.slope_count(), arm: arm.errors.counts() };

@@ -239,17 +239,17 @@ fn without_wrong_corners(
         .flat_map(|(view, own)| view.corners.iter().filter_map(move |corner| residual(corner, own)))
         .collect();
     let Some(limit) = wrong_corners::limit(lengths) else { return (problem.views.to_vec(), Vec::new()) };
-    let mut aside = Vec::new();
+    let mut rejected = Vec::new();
     let mut views = problem.views.to_vec();
     for (i, (view, own)) in views.iter_mut().zip(own).enumerate() {
         let is_good = |corner: &Corner| residual(corner, own).is_none_or(|r| r <= limit);
         let good = view.corners.iter().filter(|c| is_good(c)).count();
         if good < view.corners.len() && wrong_corners::enough(good, view.corners.len()) {
-            aside.extend(view.corners.iter().filter(|c| !is_good(c)).map(|c| (i, c.index)));
+            rejected.extend(view.corners.iter().filter(|c| !is_good(c)).map(|c| (i, c.index)));
             view.corners.retain(is_good);
         }
     }
-    (views, aside)
+    (views, rejected)
 }
 
 #[cfg(test)]

@@ -44,13 +44,13 @@ pub(in super::super) fn fine(selection: &Selection<'_>) -> Vec<Hypothesis> {
             Candidate::Effect(effect) => of_effect(&selection.model, judged, *effect),
             Candidate::Views(views) => of_views(selection, judged, views),
         };
-        found.push(if judged.as_good { beside(hypothesis) } else { hypothesis });
+        found.push(if judged.as_good { others(hypothesis) } else { hypothesis });
     }
     found
 }
 
 /// A hypothesis that explains as much as the first.
-fn beside(hypothesis: Hypothesis) -> Hypothesis {
+fn others(hypothesis: Hypothesis) -> Hypothesis {
     let both = text!("What else was found explains much the same: check both.");
     Hypothesis { accepted: true, advice: Text::sentences([hypothesis.advice, both]), ..hypothesis }
 }
