@@ -149,7 +149,7 @@ mod tests {
     #[test]
     fn every_step_has_a_layout_that_viewers_are_told_to_take_last() {
         for step in Step::ALL {
-            let arrangement = of(Arranged { step, is_companion: false, has_joints: true }).expect("made");
+            let arrangement = of(Arranged { step, is_eye_to_hand: false, has_joints: true }).expect("made");
             assert_eq!(arrangement.spaces.len(), 1, "{step:?}");
             assert!(arrangement.layout.len() > 10, "{step:?}: {}", arrangement.layout.len());
             assert!(matches!(arrangement.layout[0], LogMsg::SetStoreInfo(_)), "{step:?}");
@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn the_eye_of_the_space_is_told_where_the_cell_is_in_the_layout_that_is_shown() {
-        let arrangement = of(Arranged { step: Step::Solve, is_companion: false, has_joints: true }).expect("made");
+        let arrangement = of(Arranged { step: Step::Solve, is_eye_to_hand: false, has_joints: true }).expect("made");
         let extent = Extent { centre: Point3::new(0.5, -0.25, 0.75), radius_m: 0.5 };
         let (stream, storage) = RecordingStreamBuilder::new(APPLICATION_ID).memory().expect("a recording");
         arrangement.frame(&stream, &extent).expect("framed");

@@ -16,7 +16,7 @@ pub struct Arranged {
     /// The step of the workflow.
     pub step: Step,
     /// Whether the camera is next to the robot (eye to hand), and not on its tip.
-    pub is_companion: bool,
+    pub is_eye_to_hand: bool,
     /// Whether there are joints.
     pub has_joints: bool,
 }
@@ -104,8 +104,8 @@ fn lens(mode: Mode) -> String {
 }
 
 /// The live image, of the camera on the tip or next to the robot (eye to hand).
-fn live_image(name: &str, Arranged { is_companion, .. }: Arranged) -> ContainerLike {
-    let mode = if is_companion { Mode::EyeToHand } else { Mode::EyeInHand };
+fn live_image(name: &str, Arranged { is_eye_to_hand, .. }: Arranged) -> ContainerLike {
+    let mode = if is_eye_to_hand { Mode::EyeToHand } else { Mode::EyeInHand };
     let no_depth = format!("- /{}/{}", lens(mode), paths::DEPTH);
     Spatial2DView::new(name).with_origin(lens(mode)).with_contents(["+ $origin/**".to_owned(), no_depth]).into()
 }
@@ -150,7 +150,7 @@ mod tests {
         for step in Step::ALL {
             let (rec, storage) = RecordingStreamBuilder::new("handeye-workbench").memory().expect("a recording");
             let activation = BlueprintActivation { make_active: true, make_default: true };
-            of(Arranged { step, is_companion: true, has_joints: false }).send(&rec, activation).expect("sent");
+            of(Arranged { step, is_eye_to_hand: true, has_joints: false }).send(&rec, activation).expect("sent");
             rec.flush_blocking().expect("flushed");
             let is_reported = |message: &LogMsg| matches!(message, LogMsg::BlueprintActivationCommand(_));
             assert!(storage.take().iter().any(is_reported), "{step:?}");

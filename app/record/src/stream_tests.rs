@@ -104,7 +104,7 @@ fn the_image_of_a_camera_beside_the_robot_is_the_one_in_front() {
     document.meta.mode = Mode::EyeToHand;
     let mut bench = Bench::new();
     bench.lasting(&Entry::Step(Step::Capture));
-    assert!(!bench.stream.shown.expect("shown").arranged.is_companion);
+    assert!(!bench.stream.shown.expect("shown").arranged.is_eye_to_hand);
     bench.lasting(&Entry::Document { folder: None, document: Arc::new(document) });
-    assert!(bench.stream.shown.expect("shown").arranged.is_companion);
+    assert!(bench.stream.shown.expect("shown").arranged.is_eye_to_hand);
 }

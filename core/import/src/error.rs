@@ -43,7 +43,8 @@ pub enum ImportError {
     /// There is nothing that could be robot poses.
     #[error(
         "{folder}: no series of at least {need} poses was found ({formats} are read): {seen}",
-        folder = folder.display()
+        folder = folder.display(),
+        formats = formats.as_ref()
     )]
     NoPoses {
         /// The folder that was read.
@@ -51,7 +52,7 @@ pub enum ImportError {
         /// How many poses a calibration needs.
         need: usize,
         /// The formats with poses that are read.
-        formats: Text,
+        formats: Box<Text>,
         /// What was found instead, as text.
         seen: Text,
     },

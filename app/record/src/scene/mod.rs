@@ -175,7 +175,7 @@ impl SceneWriter {
     /// What there is to show in a step.
     pub fn arranged(&self, step: Step) -> Arranged {
         let has_joints = self.known.cell.as_ref().is_none_or(|cell| !cell.joints.is_empty());
-        Arranged { step, is_companion: self.known.mode() == Mode::EyeToHand, has_joints }
+        Arranged { step, is_eye_to_hand: self.known.mode() == Mode::EyeToHand, has_joints }
     }
 
     /// How much room all of it takes; `None` before it is known where anything is.
