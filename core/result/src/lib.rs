@@ -339,8 +339,7 @@ pub struct ViewRecord {
     #[serde(default)]
     pub distance: Option<f64>,
     /// Corners of it that were left out as outliers, by their index.
-    #[serde(default)]
-    #[serde(rename = "corners_aside")]
+    #[serde(default, rename = "corners_aside")]
     pub rejected_corners: Vec<usize>,
     /// Whether its target was numbered from another corner than detected.
     #[serde(default)]

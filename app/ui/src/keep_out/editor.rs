@@ -66,8 +66,8 @@ fn is_open(ui: &Ui) -> bool {
 
 /// The part of a room that the editor leaves for the cell.
 pub fn room_next_to(ui: &Ui, room: Rect) -> Rect {
-    let is_eye_to_hand = is_open(ui) && room.width() > 2.0 * WIDTH;
-    if is_eye_to_hand { Rect::from_min_max(room.min, room.max - Vec2::new(WIDTH, 0.0)) } else { room }
+    let is_next_to = is_open(ui) && room.width() > 2.0 * WIDTH;
+    if is_next_to { Rect::from_min_max(room.min, room.max - Vec2::new(WIDTH, 0.0)) } else { room }
 }
 
 /// The editor at the right of the view, where it is open.

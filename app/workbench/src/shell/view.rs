@@ -55,7 +55,7 @@ pub struct ViewSettings {
     pub capture: CaptureOptions,
     /// The error that is good enough.
     pub goal: Goal,
-    /// Whether each move to a chosen pose waits to be confirmed; `None` asks the cell, see [`Model::confirms_moves`].
+    /// Whether each move to a chosen pose waits to be confirmed; `None` asks the cell, see [`Model::confirms_moves`](crate::model::Model::confirms_moves).
     pub confirm_moves: Option<bool>,
     /// Light or dark.
     pub theme: ThemeChoice,

@@ -2,13 +2,13 @@
 //!
 //! | thread | does | reports through |
 //! | --- | --- | --- |
-//! | `control` | robot state, simulation, stop | events; newest [`RobotState`] |
-//! | `camera` | images, colours of the depth | events; newest [`LiveFrame`] |
+//! | `control` | robot state, simulation, stop | events; newest [`RobotState`](handeye_link::RobotState) |
+//! | `camera` | images, colours of the depth | events; newest [`LiveFrame`](crate::model::LiveFrame) |
 //! | `motion` | motions and jogs, one at a time | events; refusals through the [`MotionQueue`] |
-//! | `vision` | board in the newest image, captures | events; newest [`LiveDetection`]; [`Measured`] |
+//! | `vision` | board in the newest image, captures | events; newest [`LiveDetection`](crate::model::LiveDetection); [`Measured`](crate::capture::Measured) |
 //!
-//! What happens once travels as an [`Event`] in a bounded channel. What is only of interest while it is new (images,
-//! robot state) waits in a [`LatestSlot`]. Nothing here knows the window: a [`Waker`] wakes it.
+//! What happens once travels as an [`Event`](crate::command::Event) in a bounded channel. What is only of interest while it is new (images,
+//! robot state) waits in a [`LatestSlot`](channels::LatestSlot). Nothing here knows the window: a [`Waker`] wakes it.
 
 pub mod channels;
 pub(crate) mod files;

@@ -72,7 +72,7 @@ pub struct Overdispersion {
     pub by: Option<Evidence>,
     /// Factor by which the covariance of an estimated lens is to be multiplied, 1 or more; see [`with_less_known`].
     pub lens: f64,
-    /// Every check that could be made, none with fewer than [`NEED`] views.
+    /// Every check that could be made, none with fewer than [`NEED`](super::NEED) views.
     pub checks: Vec<Check>,
 }
 
