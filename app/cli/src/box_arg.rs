@@ -14,7 +14,7 @@ pub fn tool_box(text: &str) -> Result<TipBox, String> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|number| number.trim().parse()).collect();
     let numbers = numbers.map_err(|_none| format!("{text:?} has something that is not a number"))?;
     let [x, y, z, dx, dy, dz] = numbers[..] else {
-        return Err(format!("{} numbers: give x,y,z,dx,dy,dz, middle and edges in metres", numbers.len()));
+        return Err(format!("{} numbers: give x,y,z,dx,dy,dz, centre and edges in metres", numbers.len()));
     };
     if numbers.iter().any(|number| !number.is_finite()) {
         return Err("a number is not finite".to_owned());

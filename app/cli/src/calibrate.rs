@@ -35,7 +35,7 @@ pub struct CalibrateArgs {
     /// Write the result as JSON to this file; `-` for standard output instead of the report.
     #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     json: Option<Output>,
-    /// Which answer: the joint estimate, or one closed form.
+    /// Method: the joint estimate, or one closed form.
     #[arg(long, value_name = "NAME", default_value = "joint", value_parser = Method::names(), help_heading = heading::ESTIMATE)]
     method: String,
     /// Write the result and its exports into this folder; of several sessions into a folder each in it, by their names.

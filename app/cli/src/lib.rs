@@ -108,7 +108,7 @@ enum Command {
         after_help = "Examples:\n  handeye sample --out my_robot_images\n  handeye plan my_robot_images --count 5 --json plan.json"
     )]
     Plan(plan::PlanArgs),
-    /// Track the board live with a calibration, and have the arm follow it.
+    /// Track the board live with a calibration, and let the arm follow it.
     #[command(after_help = track::EXAMPLES)]
     Track(track::TrackArgs),
     /// Test a driver, or run one: a program between the workbench and any robot or camera (docs/drivers.md).

@@ -30,10 +30,10 @@ pub struct PlanArgs {
     /// How many poses to propose.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=50), help_heading = heading::POSES)]
     count: u32,
-    /// Seed of the views at random that are compared.
+    /// Seed of the random views that are compared.
     #[arg(long, value_name = "N", default_value_t = 1, help_heading = heading::POSES)]
     seed: u64,
-    /// Where the tool works, in the camera (x right, y down, z forward): middle and edges, metres. Errors are then those of
+    /// Where the tool works, in the camera (x right, y down, z forward): centre and edges, metres. Errors are then those of
     /// the worst point of it; without it those where the camera saw the board.
     #[arg(long = "box", value_name = "X,Y,Z,DX,DY,DZ", value_parser = box_arg::tool_box, allow_hyphen_values = true, help_heading = heading::POSES)]
     tool_box: Option<TipBox>,

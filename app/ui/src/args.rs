@@ -27,7 +27,7 @@ pub struct GuiArgs {
     /// Where its scene has the parts of the cell; as in the settings if not given.
     #[command(flatten)]
     pub objects: ObjectArgs,
-    /// File of boxes that the arm keeps out of, which is there and is written when they are changed; `keep_out.toml` next to the
+    /// Existing file of boxes that the arm keeps out of; changes are written to it; `keep_out.toml` next to the
     /// settings if not given.
     #[arg(long, value_name = "FILE", help_heading = heading::CELL)]
     pub keep_out: Option<std::path::PathBuf>,

@@ -53,7 +53,7 @@ impl JointRange {
         value.max(self.min).min(self.max)
     }
 
-    /// Whether the range is valid: not without room, NaN, or without speed.
+    /// Whether the range is valid: it has room to move, a speed, and no NaN.
     pub(super) fn is_sound(&self) -> bool {
         // Infinity as the smallest value, or its opposite as the largest, leaves no finite one.
         self.min <= self.max && self.min < f64::INFINITY && self.max > f64::NEG_INFINITY && self.speed > 0.0

@@ -1,4 +1,4 @@
-//! Other people's recordings as data sets: images with a table, a file to a pose, what other tools write.
+//! Other people's recordings as data sets: images with a table, one file per pose, files of other tools.
 //!
 //! [`open`] recognises what is in a folder ([`Recording`]): streams of images and series of poses as they were written. The
 //! target is then found in the images by the caller ([`Sight::of_corners`]). [`judge`] tries every convention that the files

@@ -8,7 +8,7 @@ use handeye_wording::text;
 
 /// The keys of `--set` and their values, for `--help`.
 pub const KEYS: &str = "  mode=eye_in_hand|eye_to_hand
-          where the camera sits
+          where the camera is mounted
   length_unit=m|mm|cm
           of the robot's positions
   angle_unit=rad|deg

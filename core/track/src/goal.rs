@@ -27,7 +27,7 @@ pub enum Keep {
 /// Where the tip should be at the time of an estimate, and how it should move on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TipGoal {
-    /// The pose of the tip that is to be reached.
+    /// Pose of the tip at that time.
     pub base_from_tip: Pose<Base, Tip>,
     /// Velocity of the tip, in base axes [m/s].
     pub velocity_m_s: Vector3<f64>,

@@ -38,8 +38,13 @@ pub fn stop(sessions: u64, only: &str) {
                 .into_par_iter()
                 .map(|seed| {
                     let arm = CellArm::ALL[seed as usize % 3];
-                    GuidedCell::new(CellSetup { noise, free_lens, not_determined, ..CellSetup::new(arm, mode, 1000 + seed) })
-                        .run(GuidedOptions { goal_m, seed, ..GuidedOptions::default() })
+                    GuidedCell::new(CellSetup {
+                        noise,
+                        free_lens,
+                        not_determined,
+                        ..CellSetup::new(arm, mode, 1000 + seed)
+                    })
+                    .run(GuidedOptions { goal_m, seed, ..GuidedOptions::default() })
                 })
                 .collect();
             // For runs whose last answer states an error.

@@ -1,5 +1,6 @@
 //! No circles of imports between files of different folders of a crate: what a folder needs can then be read, tested and moved
-//! without what needs it.
+//! without what needs it. What a folder imports from those in it does not count: a module knows its parts. Arguments of macros
+//! are not read.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -11,33 +12,32 @@ use syn::{Attribute, Item, UseTree, Visibility};
 /// A module by the names on its path from the root of the crate.
 type Module = Vec<String>;
 
-/// Paths that a file names below `crate`, `self` or `super`, and those that it exports again.
+/// Paths that a file names, and those that it imports, with the names that it has for them.
 #[derive(Default)]
 struct Named {
     paths: Vec<Vec<String>>,
-    exported: Vec<Vec<String>>,
+    imported: Vec<(String, Vec<String>)>,
 }
 
 impl Named {
-    fn flatten(&mut self, before: &[String], tree: &UseTree, is_exported: bool) {
+    fn flatten(&mut self, before: &[String], tree: &UseTree) {
         let mut path = before.to_vec();
-        match tree {
+        let (name, imported) = match tree {
             UseTree::Path(next) => {
                 path.push(next.ident.to_string());
-                self.flatten(&path, &next.tree, is_exported);
+                return self.flatten(&path, &next.tree);
             }
-            UseTree::Group(group) => group.items.iter().for_each(|item| self.flatten(&path, item, is_exported)),
-            UseTree::Name(name) => self.add(path, name.ident.to_string(), is_exported),
-            UseTree::Rename(name) => self.add(path, name.ident.to_string(), is_exported),
-            UseTree::Glob(_) => self.add(path, String::new(), is_exported),
+            UseTree::Group(group) => return group.items.iter().for_each(|item| self.flatten(&path, item)),
+            UseTree::Glob(_) => return self.paths.push(path),
+            UseTree::Name(name) => (&name.ident, &name.ident),
+            UseTree::Rename(name) => (&name.ident, &name.rename),
+        };
+        // `use super::shown::{self, Shown}` imports the module itself.
+        if name != "self" {
+            path.push(name.to_string());
         }
-    }
-
-    fn add(&mut self, mut path: Vec<String>, name: String, is_exported: bool) {
-        path.push(name);
-        if is_exported {
-            self.exported.push(path.clone());
-        }
+        let imported = if imported == "self" { path.last().cloned().unwrap_or_default() } else { imported.to_string() };
+        self.imported.push((imported, path.clone()));
         self.paths.push(path);
     }
 }
@@ -45,7 +45,8 @@ impl Named {
 impl<'ast> Visit<'ast> for Named {
     fn visit_item(&mut self, item: &'ast Item) {
         let is_of_tests = match item {
-            Item::Mod(item) => of_tests(&item.attrs),
+            // The paths of a module within the file begin elsewhere.
+            Item::Mod(item) => item.content.is_some() || of_tests(&item.attrs),
             Item::Use(item) => of_tests(&item.attrs),
             Item::Fn(item) => of_tests(&item.attrs),
             Item::Impl(item) => of_tests(&item.attrs),
@@ -55,10 +56,13 @@ impl<'ast> Visit<'ast> for Named {
             return;
         }
         if let Item::Use(item) = item {
-            self.flatten(&[], &item.tree, !matches!(item.vis, Visibility::Inherited));
+            self.flatten(&[], &item.tree);
         }
         visit::visit_item(self, item);
     }
+
+    // `pub(crate)` has a path too.
+    fn visit_visibility(&mut self, _: &'ast Visibility) {}
 
     fn visit_path(&mut self, path: &'ast syn::Path) {
         self.paths.push(path.segments.iter().map(|segment| segment.ident.to_string()).collect());
@@ -69,7 +73,7 @@ impl<'ast> Visit<'ast> for Named {
 fn of_tests(attributes: &[Attribute]) -> bool {
     let is_of_tests = |attribute: &Attribute| {
         let condition = attribute.meta.require_list().map(|list| list.tokens.to_string()).unwrap_or_default();
-        attribute.path().is_ident("cfg") && (condition.contains("test") || condition.contains("testing"))
+        attribute.path().is_ident("cfg") && condition.contains("test")
     };
     attributes.iter().any(is_of_tests)
 }
@@ -85,29 +89,31 @@ fn sources(folder: &Path, module: &[String], found: &mut BTreeMap<Module, PathBu
                 sources(&path, &inside(name), found);
             }
         } else if path.extension().is_some_and(|extension| extension == "rs") && !name.ends_with("tests") {
-            let is_of_folder = matches!(&*name, "mod" | "lib" | "main");
+            let is_of_folder = matches!(&*name, "mod" | "lib");
             found.insert(if is_of_folder { module.to_vec() } else { inside(name) }, path);
         }
     }
 }
 
+/// What modules import from each other: by module and name, the module that defines it.
+type Imported = BTreeMap<(Module, String), Module>;
+
 /// The module of the crate that defines what `path` names in `module`, as far as it can be followed without types.
 fn target(
     sources: &BTreeMap<Module, PathBuf>,
-    exported: &BTreeMap<(Module, String), Module>,
+    imported: &Imported,
     module: &[String],
     path: &[String],
 ) -> Option<Module> {
-    let mut rest = path;
-    let mut at = module.to_vec();
-    match path.first().map(String::as_str) {
-        Some("crate") => (at, rest) = (Vec::new(), &path[1..]),
-        Some("self") => rest = &path[1..],
-        Some("super") => {}
-        // A child, or another crate.
-        Some(name) if sources.contains_key(&[module, &[name.to_owned()]].concat()) => {}
-        _ => return None,
-    }
+    let first = path.first()?;
+    let (mut at, mut rest) = match first.as_str() {
+        "crate" => (Vec::new(), &path[1..]),
+        "self" => (module.to_vec(), &path[1..]),
+        "super" => (module.to_vec(), path),
+        // A child, something imported, or another crate.
+        _ if sources.contains_key(&[module, std::slice::from_ref(first)].concat()) => (module.to_vec(), path),
+        _ => (imported.get(&(module.to_vec(), first.clone()))?.clone(), &path[1..]),
+    };
     while rest.first().is_some_and(|name| name == "super") {
         at.pop();
         rest = &rest[1..];
@@ -116,18 +122,17 @@ fn target(
         let inside = [&at[..], std::slice::from_ref(name)].concat();
         if sources.contains_key(&inside) {
             at = inside;
-            rest = &rest[1..];
-        } else if let Some(next) = exported.get(&(at.clone(), name.clone())) {
+        } else if let Some(next) = imported.get(&(at.clone(), name.clone())) {
             at.clone_from(next);
-            break;
         } else {
             break;
         }
+        rest = &rest[1..];
     }
     Some(at)
 }
 
-/// Files of a crate and those that each imports from.
+/// Files of a crate and those that each imports from, its own parts left out.
 fn imports(src: &Path) -> BTreeMap<PathBuf, BTreeSet<PathBuf>> {
     let mut files = BTreeMap::new();
     sources(src, &[], &mut files);
@@ -140,22 +145,28 @@ fn imports(src: &Path) -> BTreeMap<PathBuf, BTreeSet<PathBuf>> {
             (module, named)
         })
         .collect();
-    let mut exported = BTreeMap::new();
-    // What is exported again may have been exported before.
-    for _ in 0..4 {
+    let mut imported = Imported::new();
+    loop {
+        let known = imported.len();
         for (module, named) in &named {
-            for path in &named.exported {
-                let name = path.last().expect("a name").clone();
-                if let Some(defined) = target(&files, &exported, module, path).filter(|defined| defined != *module) {
-                    exported.insert(((*module).clone(), name), defined);
+            for (name, path) in &named.imported {
+                if let Some(defined) = target(&files, &imported, module, path).filter(|defined| defined != *module) {
+                    imported.insert(((*module).clone(), name.clone()), defined);
                 }
             }
         }
+        // What is imported may be imported there as well.
+        if imported.len() == known {
+            break;
+        }
     }
     let of_file = |(module, named): (&&Module, &Named)| {
-        let targets = named.paths.iter().filter_map(|path| target(&files, &exported, module, path));
-        let others = targets.filter_map(|module| files.get(&module)).filter(|path| **path != files[*module]);
-        (files[*module].clone(), others.cloned().collect())
+        let targets = named.paths.iter().filter_map(|path| target(&files, &imported, module, path));
+        let file = &files[*module];
+        let is_part =
+            |path: &&PathBuf| path.parent() != file.parent() && path.starts_with(file.parent().expect("a folder"));
+        let others = targets.filter_map(|module| files.get(&module)).filter(|path| *path != file && !is_part(path));
+        (file.clone(), others.cloned().collect())
     };
     named.iter().map(|(module, named)| of_file((module, named))).collect()
 }
@@ -202,7 +213,7 @@ fn no_files_of_different_folders_import_from_each_other() {
 }
 
 #[test]
-fn a_circle_through_what_is_exported_again_is_found() {
+fn a_circle_is_found_through_what_is_exported_again_and_through_the_name_of_a_module() {
     let folder = tempfile::tempdir().expect("a folder");
     let write = |name: &str, text: &str| {
         let file = folder.path().join(name);
@@ -210,11 +221,12 @@ fn a_circle_through_what_is_exported_again_is_found() {
         std::fs::write(file, text).expect("written");
     };
     write("lib.rs", "mod capture; mod motion;");
-    write("capture/mod.rs", "mod state; pub use state::Capture;");
-    write("capture/state.rs", "pub struct Capture;");
-    write("motion/mod.rs", "use crate::capture::Capture;");
+    write("capture/mod.rs", "mod state; pub use state::Capture as Taken;");
+    write("capture/state.rs", "pub(crate) struct Capture;");
+    write("motion/mod.rs", "pub(crate) mod start; use crate::capture::Taken;");
+    write("motion/start.rs", "use crate::capture; fn goes(_: capture::Taken) {}");
     assert_eq!(circles(folder.path()), []);
-    write("capture/state.rs", "pub struct Capture; fn goes() { crate::motion::start(); }");
+    write("capture/state.rs", "use crate::motion; pub(crate) struct Capture; fn goes() { motion::start::goes(); }");
     let found = circles(folder.path());
-    assert!(found.iter().any(|(a, b)| a.ends_with("capture/state.rs") && b.ends_with("motion/mod.rs")), "{found:?}");
+    assert!(found.iter().any(|(a, b)| a.ends_with("capture/state.rs") && b.ends_with("motion/start.rs")), "{found:?}");
 }

@@ -97,16 +97,16 @@ struct GuidedArgs {
     /// known, else that of a measured point; 0.3 if not given.
     #[arg(long, value_name = "MM", value_parser = positive, help_heading = heading::GUIDED)]
     goal: Option<f64>,
-    /// Most captures; 40 if not given.
+    /// Largest number of captures; 40 if not given.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(3..=400), help_heading = heading::GUIDED)]
     max_poses: Option<u32>,
-    /// Most minutes, in the cell's time; no limit if not given.
+    /// Time limit in minutes of the cell's time; none if not given.
     #[arg(long, value_name = "MIN", value_parser = positive, help_heading = heading::GUIDED)]
     max_minutes: Option<f64>,
-    /// Captures afterwards, at poses at random, that never enter the fit and check the answer; 3 if not given.
+    /// Captures afterwards, at random poses, that never enter the fit and check the answer; 3 if not given.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=100), help_heading = heading::GUIDED)]
     check_poses: Option<u32>,
-    /// Where the tool works, in the camera (x right, y down, z forward): middle and edges, metres. The goal then holds for
+    /// Where the tool works, in the camera (x right, y down, z forward): centre and edges, metres. The goal then holds for
     /// the worst point of it; without it for where the camera saw the board.
     #[arg(long = "box", value_name = "X,Y,Z,DX,DY,DZ", value_parser = box_arg::tool_box, allow_hyphen_values = true, help_heading = heading::GUIDED)]
     tool_box: Option<TipBox>,

@@ -19,10 +19,10 @@ pub struct FakeArgs {
     /// Seed of everything random in the cell; the scene's own if not given.
     #[arg(long, value_name = "N", help_heading = heading::CELL)]
     seed: Option<u64>,
-    /// Be a driver of a cell that runs already (`handeye cell`) and not of one of its own.
+    /// Serve a cell that runs already (`handeye cell`) instead of starting one.
     #[arg(long, value_name = "ADDR", conflicts_with_all = ["scene", "arm_errors", "seed"], help_heading = heading::CELL)]
     connect: Option<Endpoint>,
-    /// Be the driver of one part alone, so that robot and camera are two programs.
+    /// Serve one part only, so that robot and camera are two programs.
     #[arg(long, value_name = "PART", help_heading = heading::CELL)]
     only: Option<Part>,
     /// Where the clock of the stamps begins, in seconds.

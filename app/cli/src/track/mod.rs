@@ -38,7 +38,7 @@ pub struct TrackArgs {
     /// The calibration: a result JSON, or a session that is solved.
     #[arg(long, value_name = "FILE", help_heading = heading::TRACKING)]
     calibration: PathBuf,
-    /// Have the arm keep the view of the board that it has at the beginning.
+    /// Let the arm keep the view of the board that it has at the beginning.
     #[arg(long, help_heading = heading::FOLLOWING)]
     follow: bool,
     /// With --follow: where the arm has no room to go along with the board, move it to the nearest place where it has, as

@@ -106,7 +106,7 @@ impl App {
         let sessions = desk.sessions().to_path_buf();
         let shown = in_browser.is_some();
         let model = Model { addresses, drivers, objects, sessions, in_browser: shown, ..Model::new(source, view) };
-        let (keep_out, fault) = crate::keep_out::update::opened(keep_out);
+        let (keep_out, fault) = crate::keep_out::file::opened(keep_out);
         let model = Model { keep_out, ..model };
         let mut app = Self {
             cx: Context { model, workers, desk, numbers: Numbers::default(), reported: VecDeque::new() },

@@ -29,7 +29,7 @@ pub struct Offered {
     pub name: &'static str,
     /// What it can be chosen for.
     parts: &'static [Part],
-    /// What it is always given where it is the camera alone.
+    /// Arguments that it always gets as the driver of a camera only.
     pub camera_alone: &'static [&'static str],
     /// What can be set for it.
     pub fields: &'static [Field],

@@ -75,9 +75,7 @@ impl LinkState {
     pub fn is_connected(&self) -> bool {
         matches!(self, Self::Connected { .. })
     }
-}
 
-impl LinkState {
     /// The state before the first try.
     pub(crate) fn first(source: &CellSource) -> Self {
         match source {

@@ -2,6 +2,7 @@
 //! file.
 
 pub mod command;
+pub(crate) mod file;
 pub mod state;
 pub(crate) mod update;
 

@@ -20,7 +20,7 @@ pub struct FrameInfo {
     pub number: u64,
     /// Simulated time of the images \[s\]; of images from a driver, time of the workbench.
     pub sim_time_s: f64,
-    /// How far they and the pose and joints may be apart \[s\]: zero if all are from one instant.
+    /// How far apart in time they and the pose and joints may be \[s\]: zero if all are from one instant.
     pub image_age_s: f64,
     /// How far the tip may have moved meanwhile \[m\], at its speed since the images before; a rotation counts as at one
     /// metre from the tip.

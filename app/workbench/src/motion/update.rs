@@ -13,8 +13,7 @@ use crate::model::Model;
 use crate::motion::ask::{go_home, may_set_out, set_out};
 use crate::motion::correction::corrected;
 use crate::motion::rest::{stop, stopped};
-use crate::motion::state::Correction;
-use crate::motion::state::{JogStep, Motion, MotionId, MotionRequest};
+use crate::motion::state::{Correction, JogStep, Motion, MotionId, MotionRequest};
 use crate::shell::state::Pane;
 use crate::text::Text;
 use crate::track::update::follow_ended;
@@ -37,9 +36,9 @@ pub(crate) fn apply(cx: &mut Context, command: Command) {
     }
 }
 
-/// What a motion was for that has ended.
+/// A motion that has ended, by its purpose, with its outcome.
 pub(crate) enum Ended {
-    /// The plan of poses to verify at.
+    /// The plan of verification poses.
     Plan(MotionOutcome),
     /// The sequence that is under way.
     Sequence(MotionOutcome),
@@ -81,6 +80,7 @@ fn start(cx: &mut Context, goal: MotionGoal, what: Text, correction: Option<Corr
         Ok(()) => {
             cx.model.motion = Motion::Moving { id, what, since_s: cx.model.now_s };
         }
+        // It is still the newest motion when that is taken in: no guided choice is open while a move begins.
         Err(busy) => cx.report(Event::Moved { id, outcome: MotionOutcome::Failed(busy.into()) }),
     }
 }

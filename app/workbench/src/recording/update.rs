@@ -94,8 +94,8 @@ pub(crate) fn note_changes(recording: &dyn Recording, model: &Model, recorded: &
         recorded.around = Some(around);
         recording.note(Entry::KeepOut { scene_obstacles, own });
     }
-    let unstated: Vec<_> = model.messages.iter().rev().take_while(|it| it.number >= recorded.reported).collect();
-    for message in unstated.into_iter().rev() {
+    let unrecorded: Vec<_> = model.messages.iter().rev().take_while(|it| it.number >= recorded.reported).collect();
+    for message in unrecorded.into_iter().rev() {
         recorded.reported = message.number + 1;
         recording
             .note(Entry::Message { severity: message.severity, words: message.text.in_language(Language::English) });

@@ -30,14 +30,14 @@ pub(crate) fn list_folder(model: &mut Model, desk: &SessionThreads, folder: Path
     model.notify_if_refused(text!("The folder was not read"), asked);
 }
 
-/// Notifies the threads that look for the board of the target.
+/// Sends the target to the threads that look for the board.
 pub(crate) fn send_target(model: &mut Model, workers: &Workers) {
     let target = model.document().meta.target;
     let asked = workers.ask_vision(VisionTask::SetTarget(target));
     model.notify_if_refused(text!("The target was not changed"), asked);
 }
 
-/// Notifies them of the camera's intrinsics.
+/// Sends them the camera's intrinsics.
 pub(crate) fn send_intrinsics(model: &mut Model, workers: &Workers) {
     let Some(intrinsics) = model.intrinsics() else { return };
     let asked = workers.ask_vision(VisionTask::SetIntrinsics(intrinsics));

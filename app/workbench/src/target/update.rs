@@ -28,7 +28,7 @@ fn set_target(model: &mut Model, workers: &Workers, desk: &SessionThreads, targe
     edit(model, desk, Edit::SetTarget(target));
 }
 
-/// The name of its file, which distinguishes boards.
+/// Name of the board's file, different for different boards.
 fn file_name(target: &TargetSpec) -> String {
     let size = match target {
         TargetSpec::AprilTag(tag) => format!("{}", tag.id),

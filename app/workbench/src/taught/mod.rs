@@ -3,7 +3,7 @@
 pub(crate) mod break_off;
 mod cell;
 pub mod command;
-mod let_go;
+mod confirm;
 pub(crate) mod sequence;
 pub mod update;
 

@@ -20,8 +20,7 @@ use crate::shell::state::Pane;
 use crate::taught::break_off::{break_off, pane_of};
 use crate::text::Text;
 use crate::worker::threads::Workers;
-use handeye_link::ViewsRequest;
-use handeye_link::{MotionGoal, MotionOutcome};
+use handeye_link::{MotionGoal, MotionOutcome, ViewsRequest};
 use handeye_wording::text;
 
 /// Poses that are planned for verification: enough for an average and a scatter, and over within a minute or two.
@@ -229,6 +228,7 @@ pub(crate) fn go_to_taught(cx: &mut Context, name: &str) {
 }
 
 fn refuse(cx: &mut Context, why: Text) {
+    cx.numbers.motion = MotionId(cx.numbers.motion.0 + 1);
     let id = cx.numbers.motion;
     cx.report(motion::Event::Moved { id, outcome: MotionOutcome::Refused(why) });
 }

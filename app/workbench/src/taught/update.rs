@@ -16,7 +16,7 @@ use crate::session::desk::SessionThreads;
 use crate::session::requests::edit;
 use crate::session::start::REFERENCE_POSES;
 use crate::session::state::PoseSequence;
-use crate::taught::let_go::{confirm_move, set_confirm_moves, skip_move};
+use crate::taught::confirm::{confirm_move, set_confirm_moves, skip_move};
 use crate::taught::sequence::{go_to_taught, next_stop, plan_verification, planned, run_sequence, stop_sequence};
 use crate::worker::files::FileTask;
 use handeye_wording::text;

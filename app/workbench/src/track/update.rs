@@ -64,7 +64,7 @@ pub(crate) fn set_tracking(model: &mut Model, workers: &Workers, numbers: &mut N
     }
 }
 
-/// What corrects tip poses and commands.
+/// The calibration that corrects tip poses and commands, if wanted.
 fn correcting(model: &Model) -> Option<&Corrected> {
     match model.track.wants_corrected {
         Some(wanted) => corrected(model).filter(|_| wanted).map(|(_, corrected)| corrected),
@@ -72,8 +72,8 @@ fn correcting(model: &Model) -> Option<&Corrected> {
     }
 }
 
-/// Switches tracking by corrected tip poses on or off if the situation has changed: the robot reports again, or another arm. An arm
-/// that follows continues as it began.
+/// Switches tracking by corrected tip poses on or off if whether it applies has changed: the robot reports again, or it is another
+/// arm. An arm that follows continues as it began.
 pub(crate) fn reconsider_correction(model: &mut Model, workers: &Workers) {
     let corrects = model.track.by.as_ref().is_some_and(|by| by.arm.is_some());
     if model.track.on

@@ -123,7 +123,7 @@ pub fn perform(task: FileTask, outlet: &Outlet) {
                 Err(error) => outlet.notice(Severity::Error, text!("The boxes were not read: {error}", error = error)),
             }
         }
-        FileTask::WriteKeepOut { file, text, is_wished } => match keep_out::update::write(&file, &text) {
+        FileTask::WriteKeepOut { file, text, is_wished } => match keep_out::file::write(&file, &text) {
             Ok(()) if is_wished => {
                 outlet.notice(Severity::Info, text!("Boxes written to {file}", file = file.display()));
             }

@@ -380,11 +380,11 @@ impl Drop for Workers {
 }
 
 #[cfg(test)]
-#[path = "live_tests.rs"]
+#[path = "threads_live_tests.rs"]
 mod live_tests;
 #[cfg(test)]
-#[path = "motion_tests.rs"]
+#[path = "threads_motion_tests.rs"]
 mod motion_tests;
 #[cfg(test)]
-#[path = "tests.rs"]
+#[path = "threads_tests.rs"]
 mod tests;

@@ -1,4 +1,4 @@
-//! Recordings that have a file to a pose.
+//! Recordings with one file per pose.
 
 use std::ffi::OsStr;
 use std::path::Path;
@@ -16,7 +16,7 @@ pub(super) struct PoseFiles;
 
 impl Format for PoseFiles {
     fn name(&self) -> Text {
-        text!("a file to a pose")
+        text!("one file per pose")
     }
 
     fn sniff(&self, file: &File) -> bool {

@@ -190,7 +190,12 @@ pub(super) fn sources(
             )
         };
         let need = LEAST_POSES;
-        return Err(ImportError::NoPoses { folder: recording.root.clone(), need, formats: Box::new(with_poses()), seen });
+        return Err(ImportError::NoPoses {
+            folder: recording.root.clone(),
+            need,
+            formats: Box::new(with_poses()),
+            seen,
+        });
     }
     Ok((out, untried))
 }

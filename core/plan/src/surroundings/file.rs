@@ -25,7 +25,7 @@ pub enum SurroundingsError {
     /// The file system cannot read it.
     #[error("{file} cannot be read: {source}", file = file.display())]
     Unreadable {
-        /// The file that was read.
+        /// The file that could not be read.
         file: PathBuf,
         /// The reason.
         source: std::io::Error,
@@ -33,7 +33,7 @@ pub enum SurroundingsError {
     /// Not TOML, or an unknown or missing key.
     #[error("{file}: {message}", file = file.display())]
     Syntax {
-        /// The file that was read.
+        /// The file.
         file: PathBuf,
         /// The parser's message, with the line.
         message: String,
@@ -41,7 +41,7 @@ pub enum SurroundingsError {
     /// A value that is not valid.
     #[error("{file}, {entry}", file = file.display(), entry = entry.with_fault(fault))]
     Entry {
-        /// The file that was read.
+        /// The file.
         file: PathBuf,
         /// The entry.
         entry: EntryName,

@@ -108,7 +108,7 @@ impl Workspace {
 /// Where the tip should be at the moment, and how it should move on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FollowGoal {
-    /// The pose of the tip that is to be reached.
+    /// Pose of the tip at that time.
     pub base_from_tip: Pose<Base, Tip>,
     /// Velocity of the tip, in base axes [m/s].
     pub velocity_m_s: Vector3<f64>,

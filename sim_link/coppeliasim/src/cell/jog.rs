@@ -17,7 +17,7 @@ use crate::error::LinkError;
 /// Name of the task, in messages.
 const TASK: &str = "jogging the arm";
 
-/// A jog of one joint, along an axis or about one.
+/// A jog of one joint, or of the tip along or about a direction.
 #[derive(Debug, Clone, Copy)]
 pub enum ArmJog<'a> {
     /// One joint, counted from 0 at the base.

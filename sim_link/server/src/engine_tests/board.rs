@@ -1,4 +1,4 @@
-//! The board that moves, hides, and is where the moment of an image reports it.
+//! The board that moves and hides; the moment of an image has the pose at which it was drawn.
 
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Camera, PointIn, Pose, Target, Tip};

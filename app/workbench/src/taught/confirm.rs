@@ -1,4 +1,5 @@
-//! What the user decides of a move that waits: it begins, or it is left out.
+//! What the user decides about a move that waits: it begins, or it is skipped. Moves of sequences, to captures and home wait alike;
+//! it is decided here because a sequence continues with it.
 
 use crate::app::context::Context;
 use crate::guided::update::{guided_chooses_again, guided_skips};
