@@ -152,8 +152,8 @@ mod tests {
             let activation = BlueprintActivation { make_active: true, make_default: true };
             of(Arranged { step, is_eye_to_hand: true, has_joints: false }).send(&rec, activation).expect("sent");
             rec.flush_blocking().expect("flushed");
-            let is_reported = |message: &LogMsg| matches!(message, LogMsg::BlueprintActivationCommand(_));
-            assert!(storage.take().iter().any(is_reported), "{step:?}");
+            let is_activation = |message: &LogMsg| matches!(message, LogMsg::BlueprintActivationCommand(_));
+            assert!(storage.take().iter().any(is_activation), "{step:?}");
         }
     }
 }

@@ -58,19 +58,17 @@ fn the_error_of_a_lens_that_is_known_to_half_a_pixel_is_counted_and_the_views_ma
 fn what_a_lens_taken_as_exact_leaves_out_is_said() {
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
         let (calibration, _) = solved(mode, 60, CameraKnowledge::Fixed);
-        let stated_before_m =
+        let expected_m =
             calibration.joint.as_ref().and_then(|joint| joint.error_at_half_a_pixel_95_m).expect("it was given");
         let near = |lens| CameraKnowledge::Near(KnownLens { intrinsics: lens, accuracy_px: 0.5 });
         let (estimated, _) = solved(mode, 60, near);
         let stated_m = estimated.tip_error_95_m().expect("stated");
-        println!("{mode:?}: {stated_before_m} m said, {stated_m} m stated");
+        println!("{mode:?}: {expected_m} m by the finding, {stated_m} m stated");
         // Noise levels and reference point are those of another fit.
-        assert!((stated_before_m / stated_m - 1.0).abs() < 0.25, "{mode:?}: {stated_before_m} {stated_m}");
-        assert!(stated_before_m > 2.0 * calibration.tip_error_95_m().expect("stated"), "{mode:?}");
+        assert!((expected_m / stated_m - 1.0).abs() < 0.25, "{mode:?}: {expected_m} {stated_m}");
+        assert!(expected_m > 2.0 * calibration.tip_error_95_m().expect("stated"), "{mode:?}");
         let finding = find(&calibration, FindingCode::LensTakenAsExact).expect("more than what is stated");
-        assert!(
-            (finding.value("expected_error_at_half_a_pixel").expect("a number") - stated_before_m * 1e3).abs() < 1e-9
-        );
+        assert!((finding.value("expected_error_at_half_a_pixel").expect("a number") - expected_m * 1e3).abs() < 1e-9);
         assert!(find(&estimated, FindingCode::LensTakenAsExact).is_none(), "{mode:?}");
     }
 }

@@ -32,19 +32,14 @@ pub fn stop(sessions: u64, only: &str) {
         ("goal 1 mm, robot off by 1.5 mm by place", 1e-3, field, false, as_said),
         ("goal 2 mm, robot off by 1.5 mm by place", 2e-3, field, false, as_said),
     ];
-    for (name, goal_m, noise, free_lens, not_determined) in rows.into_iter().filter(|row| row.0.contains(only)) {
+    for (name, goal_m, noise, free_lens, hidden) in rows.into_iter().filter(|row| row.0.contains(only)) {
         for mode in [Mode::EyeInHand, Mode::EyeToHand] {
             let runs: Vec<_> = (0..sessions)
                 .into_par_iter()
                 .map(|seed| {
                     let arm = CellArm::ALL[seed as usize % 3];
-                    GuidedCell::new(CellSetup {
-                        noise,
-                        free_lens,
-                        not_determined,
-                        ..CellSetup::new(arm, mode, 1000 + seed)
-                    })
-                    .run(GuidedOptions { goal_m, seed, ..GuidedOptions::default() })
+                    GuidedCell::new(CellSetup { noise, free_lens, hidden, ..CellSetup::new(arm, mode, 1000 + seed) })
+                        .run(GuidedOptions { goal_m, seed, ..GuidedOptions::default() })
                 })
                 .collect();
             // For runs whose last answer states an error.

@@ -22,8 +22,8 @@ pub use crate::capture::state::{
     CaptureOptions, CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, LiveDetection, RefusalKind,
 };
 pub use crate::connect::state::{Link, LinkState};
-pub use crate::export::state::{ExportState, Preview, PreviewFile, Written};
-pub use crate::import::state::{Converted, Found, ImportState, ImportWork};
+pub use crate::export::state::{ExportState, PreviewFile, Written};
+pub use crate::import::state::{Found, ImportState, ImportWork};
 pub use crate::live::state::{
     ColouredDepth, FrameImages, FrameInfo, ImagePoint, LiveFrame, MeasuredTwice, Overlays, PickedPoint, Viewport,
     exports_of,
@@ -37,13 +37,11 @@ pub use crate::session::state::{
 };
 pub use crate::shell::state::{Dialog, Pane, Step};
 pub use crate::shell::view::{DepthScale, Goal, RotationFormat, ThemeChoice, ViewSettings};
-pub use crate::solve::estimated::{EstimatedValue, estimated};
+pub use crate::solve::estimated::estimated;
 pub use crate::solve::state::{Corrected, JobId, SolveState, SolveStatus, Solved};
-pub use crate::solve::tip_box::{BoxState, WorkBox, in_camera as box_in_camera, judge_box};
-pub use crate::track::state::{
-    BoardMotion, FollowRequest, FollowStatus, MAX_TRACK_POINTS, TrackError, TrackPoint, TrackState, Tracked,
-};
-pub use crate::track::trail::{MAX_TRAIL_POINTS, Trail};
+pub use crate::solve::tip_box::{BoxState, WorkBox, judge_box};
+pub use crate::track::state::{BoardMotion, FollowRequest, FollowStatus, TrackError, TrackPoint, TrackState, Tracked};
+pub use crate::track::trail::Trail;
 pub use handeye_coppeliasim::cell::BoardPath;
 pub use handeye_link::{
     ArmDoubt, Axis, CellFacts, CellSource, Drivers, Jog, JogFrame, JointFacts, MotionGoal, MotionOutcome, Moves,

@@ -26,22 +26,13 @@ pub mod fake;
 
 pub use crate::connect::worker::ControlTask;
 pub use crate::live::worker::CameraTask;
-pub use crate::motion::desk::{MotionQueue, MotionTask};
-pub use crate::motion::jog_line::HELD_S;
+pub use crate::motion::desk::MotionQueue;
 pub use crate::motion::stop_line::StopLine;
 pub use crate::motion::worker::MotionLook;
-pub use crate::session::archive::{ArchiveTask, Beginning, timestamp, timestamp_rfc3339};
-pub use crate::session::desk::SessionThreads;
-pub use crate::solve::observer::ObserveJob;
+pub use crate::session::archive::{timestamp, timestamp_rfc3339};
 pub use crate::solve::worker::{SolveJob, answer, examined};
 pub use crate::track::follow_line::FollowLine;
 pub use crate::track::worker::{TrackedBy, TrackedImage, Tracking};
-pub use files::{ExportJob, FileTask};
-pub use handeye_link::{
-    CameraPort, Cell, Connected, ControlPort, JogRequest, MotionPort, Newest, PortError, RawFrame, RemoteCell, Room,
-    ViewsRequest, end_of_following,
-};
-pub use link::Request;
-pub use shared::{Busy, Clock, JOIN_DEADLINE, Waker};
+pub use handeye_link::{Cell, PortError};
+pub use shared::{Clock, Waker};
 pub use started::Started;
-pub use vision::VisionTask;

@@ -133,10 +133,10 @@ pub(super) fn sources(
             }
         };
         let samples = &recording.tracks[robot].samples;
-        let is_companion = |target: &Track| {
+        let is_of_same_rows = |target: &Track| {
             target.samples.len() == samples.len() && target.samples.iter().zip(samples).all(|(a, b)| a.place == b.place)
         };
-        let of_rows = matches!(source, Source::Track(i) if is_companion(&recording.tracks[i]));
+        let of_rows = matches!(source, Source::Track(i) if is_of_same_rows(&recording.tracks[i]));
         let is_in_step = |pairing: &Pairing| pairing.image_of.iter().enumerate().all(|(i, image)| *image == Some(i));
         // Two poses of one row are of one moment.
         for pairing in pairings(samples, images, LEAST_POSES).into_iter().filter(|it| !of_rows || is_in_step(it)) {

@@ -52,8 +52,7 @@ fn an_arm_whose_links_are_off_reaches_the_goal_by_corrected_commands() {
     for (arm, mode) in
         [(CellArm::Ur5e, Mode::EyeInHand), (CellArm::Panda, Mode::EyeInHand), (CellArm::Xarm6, Mode::EyeToHand)]
     {
-        let mut cell =
-            GuidedCell::new(CellSetup { not_determined: LINKS, noise: PRECISE, ..CellSetup::new(arm, mode, 3) });
+        let mut cell = GuidedCell::new(CellSetup { hidden: LINKS, noise: PRECISE, ..CellSetup::new(arm, mode, 3) });
         let run = cell.run(options(goal_m));
         let Ending::GoalReached { promised } = run.ending else { panic!("{arm:?} {mode:?}: {:?}", run.ending) };
         assert_eq!(
@@ -77,7 +76,7 @@ fn an_arm_whose_links_are_off_reaches_the_goal_by_corrected_commands() {
 
 #[test]
 fn a_goal_below_what_the_arm_repeats_is_said_to_be() {
-    let setup = CellSetup { not_determined: LINKS, ..CellSetup::new(CellArm::Ur5e, Mode::EyeInHand, 3) };
+    let setup = CellSetup { hidden: LINKS, ..CellSetup::new(CellArm::Ur5e, Mode::EyeInHand, 3) };
     let run = GuidedCell::new(setup).run(GuidedOptions { most_views: 12, ..options(5e-5) });
     let Ending::Repeatability { promised } = run.ending else { panic!("{:?}", run.ending) };
     assert!(promised.least_m > 5e-5 && promised.least_m < promised.error_m, "{promised:?}");

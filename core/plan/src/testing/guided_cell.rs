@@ -74,7 +74,7 @@ pub struct CellSetup {
     /// of the other studies, and a first view that is tilted a little.
     pub straight: Option<f64>,
     /// What differs from the stated values.
-    pub not_determined: HiddenErrors,
+    pub hidden: HiddenErrors,
     /// Seed of places and noise.
     pub seed: u64,
 }
@@ -82,15 +82,7 @@ pub struct CellSetup {
 impl CellSetup {
     /// A good robot and a good camera whose lens is known, a first view that is tilted a little, and everything as stated.
     pub fn new(arm: CellArm, mode: Mode, seed: u64) -> Self {
-        Self {
-            arm,
-            mode,
-            noise: REALISTIC,
-            free_lens: false,
-            straight: None,
-            not_determined: HiddenErrors::NOTHING,
-            seed,
-        }
+        Self { arm, mode, noise: REALISTIC, free_lens: false, straight: None, hidden: HiddenErrors::NOTHING, seed }
     }
 }
 
@@ -231,9 +223,9 @@ impl GuidedCell {
             Distortion::None => Intrinsics { distortion: DEFAULT_MODEL, ..lens },
             _ => lens,
         };
-        let focal = setup.not_determined.focal;
+        let focal = setup.hidden.focal;
         let mut of_links = ChaCha8Rng::seed_from_u64(setup.seed ^ 0x117c5);
-        let true_chain = setup.not_determined.links.map(|(rad, m)| {
+        let true_chain = setup.hidden.links.map(|(rad, m)| {
             let mut moved: Vec<Isometry3<f64>> =
                 (0..arm.chain.joint_count()).map(|_| se3::exp(&noise_twist(&mut of_links, m, rad))).collect();
             // A tool behind the last joint would be found with the same arm, which hides the displacement of that along its
@@ -257,7 +249,7 @@ impl GuidedCell {
                 camera: knowledge,
                 views: Vec::new(),
             },
-            points: bent(&BOARD.points(), setup.not_determined.bend_m, 1.0),
+            points: bent(&BOARD.points(), setup.hidden.bend_m, 1.0),
             field: None,
             true_chain,
             joints_rad: Vec::new(),

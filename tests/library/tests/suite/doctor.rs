@@ -245,9 +245,9 @@ fn where_the_field_of_the_robot_leaves_the_size_open_the_stated_error_counts_wha
 #[test]
 fn the_error_beside_a_lens_that_was_given_wrongly_is_that_of_the_answer() {
     for seed in 1000..1006 {
-        let not_determined = HiddenErrors { focal: 0.99, ..HiddenErrors::NOTHING };
+        let hidden = HiddenErrors { focal: 0.99, ..HiddenErrors::NOTHING };
         let (arm, mode) = (CellArm::ALL[seed as usize % 3], Mode::EyeInHand);
-        let setup = CellSetup { not_determined, ..CellSetup::new(arm, mode, seed) };
+        let setup = CellSetup { hidden, ..CellSetup::new(arm, mode, seed) };
         let options = GuidedOptions { goal_m: 5e-4, candidates: 300, most_views: 18, ..GuidedOptions::default() };
         let run = GuidedCell::new(setup).run(options);
         let (views, stated_m, true_m) = *run.history.last().expect("one cause explains it");

@@ -14,7 +14,7 @@ use handeye_geometry::targets::observation::{Corner, Corners};
 use handeye_server::{CellConfig, CellServer};
 use image::RgbImage;
 
-use super::super::{Cell, Clock, RemoteCell, Waker, threads::Workers};
+use super::super::{Cell, Clock, Waker, threads::Workers};
 use super::{LatestSlot, Outlet, Tap, Vision, VisionSlots, VisionTask};
 use crate::capture::drawn::BOARD;
 use crate::capture::state::{CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait, LiveDetection};
@@ -24,6 +24,7 @@ use crate::live::state::{ColouredDepth, FrameImages, FrameInfo, LiveFrame};
 use crate::shell::view::{DepthScale, ViewSettings};
 use crate::{capture, live};
 use handeye_link::CellSource;
+use handeye_link::RemoteCell;
 
 /// A healthy cell answers within milliseconds; this is for a machine that is busy.
 const PATIENCE: Duration = Duration::from_mins(1);

@@ -124,10 +124,9 @@ fn an_arm_whose_joints_are_recorded_is_planned_by_its_errors_though_nobody_drive
     use handeye_estimate::handeye::joint::Noise;
     use handeye_simulate::session::REALISTIC;
 
-    let not_determined = HiddenErrors { links: Some((1.2e-3, 2.5e-4)), ..HiddenErrors::NOTHING };
+    let hidden = HiddenErrors { links: Some((1.2e-3, 2.5e-4)), ..HiddenErrors::NOTHING };
     let noise = Noise { robot_m: 2e-5, robot_rad: 4e-5, ..REALISTIC };
-    let mut cell =
-        GuidedCell::new(CellSetup { noise, not_determined, ..CellSetup::new(CellArm::Ur5e, Mode::EyeInHand, 3) });
+    let mut cell = GuidedCell::new(CellSetup { noise, hidden, ..CellSetup::new(CellArm::Ur5e, Mode::EyeInHand, 3) });
     let run = cell.run(GuidedOptions { most_views: 10, ..options() });
     let calibration = run.calibration.expect("ten views");
     let reach = calibration.reach().expect("the joints are known");
