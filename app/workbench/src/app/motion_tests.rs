@@ -5,9 +5,9 @@ use handeye_dataset::taught_poses::{Goal, TaughtPose};
 
 use super::tests::{bench, reported};
 use super::*;
-use crate::model::{CapturePurpose, Drivers, JointFacts, Motion, MotionOutcome, Moves, StopOutcome};
+use crate::model::{CapturePurpose, Drivers, JointFacts, Motion, MotionId, MotionOutcome, Moves, StopOutcome};
 use crate::testing::sample;
-use crate::text::Language;
+use crate::text::{Language, Text};
 use crate::worker::fake::FakeCell;
 use crate::{connect, motion, taught};
 
@@ -72,6 +72,30 @@ fn a_session_begins_with_the_reference_poses_for_the_arm_they_are_meant_for_alon
     let mut unknown = model;
     unknown.cell = None;
     assert!(!unknown.has_reference_poses());
+}
+
+#[test]
+fn a_move_that_cannot_begin_ends_the_sequence_with_the_command_that_asked_for_it() {
+    let mut bench = bench(&FakeCell::new(0));
+    let app = &mut bench.app;
+    app.replace_model(taught_at(scene(ShippedScene::Reference)));
+    app.cx.workers.shut_down(std::time::Duration::from_secs(10));
+    app.apply(taught::Command::RunSequence { purpose: None });
+    assert!(!app.model().sequence_runs && app.model().motion == Motion::Idle);
+    assert!(reported(app).starts_with("The sequence was broken off"), "{}", reported(app));
+}
+
+#[test]
+fn a_pose_that_is_not_taught_any_more_does_not_end_the_motion_that_is_under_way() {
+    let mut bench = bench(&FakeCell::new(0));
+    let app = &mut bench.app;
+    app.replace_model(taught_at(scene(ShippedScene::Reference)));
+    let motion = Motion::Moving { id: MotionId(7), what: Text::verbatim("home"), since_s: 0.0 };
+    app.cx.numbers.motion = MotionId(7);
+    app.cx.model.motion = motion.clone();
+    app.apply(taught::Command::GoTo("gone".to_owned()));
+    assert_eq!(app.model().motion, motion);
+    assert!(reported(app).contains("it is no longer taught"), "{}", reported(app));
 }
 
 #[test]
