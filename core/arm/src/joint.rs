@@ -49,7 +49,7 @@ impl JointRange {
     }
 
     /// The nearest value in the range.
-    pub(crate) fn clamp(&self, value: f64) -> f64 {
+    pub fn clamp(&self, value: f64) -> f64 {
         value.max(self.min).min(self.max)
     }
 

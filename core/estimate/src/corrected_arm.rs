@@ -1,9 +1,11 @@
 //! An arm whose own errors are known: where its tip really is, and what to command so that it gets where it should be.
 
-use nalgebra::{DMatrix, Matrix3, Matrix6, Matrix6xX, Vector6};
+use nalgebra::{DMatrix, Matrix3, Matrix6, Matrix6xX, Vector3, Vector6};
 
 use crate::arm_fit::ArmFit;
+use crate::few_joints::{self, PointGoal};
 use crate::handeye::joint::{ArmErrors, SmallSample};
+use crate::reach_error::USUAL_TOOL;
 use handeye_arm::{Arm, ArmError, IkError, JointRange};
 use handeye_geometry::frames::{Base, Pose, Tip};
 
@@ -12,6 +14,9 @@ use handeye_geometry::frames::{Base, Pose, Tip};
 const STEPS: usize = 20;
 /// Distance in metres and angle in radians at which a command has arrived.
 const ARRIVED: f64 = 1e-9;
+/// Largest angle between a wanted orientation and that of an arm with fewer than six joints, radians. A wanted pose that the arm has
+/// by its own kinematics is off by its errors alone, which are degrees at most.
+const TURN_OF_FEW_JOINTS: f64 = 5.0 * std::f64::consts::PI / 180.0;
 
 /// An arm as its controller models it, where it is mounted, and its errors.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +32,8 @@ pub struct CorrectedArm {
     pub unexplained: (f64, f64),
     /// How errors are distributed in units of the covariance.
     pub small_sample: SmallSample,
+    /// The tip of the tool in the frame of the tip, metres: what arrives where the arm has fewer than six joints.
+    pub tool_m: Vector3<f64>,
 }
 
 /// Why there is no command.
@@ -49,6 +56,17 @@ pub enum CorrectError {
         steps: usize,
         /// How far off the last one is, millimetres.
         distance_mm: f64,
+    },
+    /// An arm with few joints does not turn its tip every way.
+    #[error(
+        "an arm with {joints} joints does not turn its tip this way: the nearest it gets with its tool at this place is \
+         {angle_deg:.1}° off; use an orientation that it has there, by its own kinematics"
+    )]
+    Orientation {
+        /// Joints of the arm.
+        joints: usize,
+        /// Angle to the nearest orientation, degrees.
+        angle_deg: f64,
     },
 }
 
@@ -73,7 +91,14 @@ impl CorrectedArm {
             covariance: fit.errors_covariance(),
             unexplained: (fit.noise.robot_m, fit.noise.robot_rad),
             small_sample: fit.small_sample,
+            tool_m: USUAL_TOOL.into(),
         })
+    }
+
+    /// The same with another tool.
+    #[must_use]
+    pub fn with_tool(self, tool_m: Vector3<f64>) -> Self {
+        Self { tool_m, ..self }
     }
 
     /// Where the tip really is with these joint values.
@@ -135,7 +160,8 @@ impl CorrectedArm {
         Ok(unexplained + Matrix6::from_iterator(known.iter().copied()))
     }
 
-    /// The command that takes the tip to the true pose `wanted`, by the configuration nearest to `near`.
+    /// The command that takes the tip to the true pose `wanted`, by the configuration nearest to `near`. An arm with fewer than six
+    /// joints takes the tip of its tool where that pose has it, and turns as near to the orientation as it can: within 5°.
     ///
     /// # Errors
     /// [`CorrectError`] states why the arm does not get there.
@@ -152,6 +178,10 @@ impl CorrectedArm {
         near: &[f64],
         arrived: f64,
     ) -> Result<Vec<f64>, CorrectError> {
+        if few_joints::has_few_joints(self) {
+            let goal = PointGoal { base_from_tip: wanted, free_about_tool: false, turn_rad: TURN_OF_FEW_JOINTS };
+            return few_joints::joints_for(self, &goal, near, arrived);
+        }
         let mut pose = *wanted;
         let mut joints_rad = near.to_vec();
         let mut distance_m = f64::INFINITY;
@@ -206,6 +236,7 @@ mod tests {
             covariance: DMatrix::identity(count, count) * 1e-10,
             unexplained: (2e-5, 1e-5),
             small_sample: SmallSample::KNOWN,
+            tool_m: USUAL_TOOL.into(),
         }
     }
 

@@ -88,6 +88,7 @@ mod corners;
 pub mod corrected_arm;
 mod detected_view;
 pub mod diagnose;
+mod few_joints;
 mod given_lens;
 pub mod handeye;
 pub mod intrinsics;

@@ -5,7 +5,8 @@
 //! there: its 95 % quantile over the views, over points of the target, over directions of the tool and over the uncertainty of arm
 //! and camera. The tool is sent against the target's normal with the camera on the arm, along the mean axis of the tip with the
 //! camera next to it, tilted by up to 15° with any turn about its axis. The TCP is what the same arm finds by turning about one
-//! point, as is usual in practice.
+//! point, as is usual in practice. An arm with fewer than six joints does not turn like that: its TCP is what it finds by touching
+//! points that the camera saw, and its tool is sent in the direction nearest to the wanted one, up to 30° from it.
 //!
 //! # How
 //! Errors of the arm and both transforms are drawn from their joint posterior; every draw is an arm that the data allow. The
@@ -24,6 +25,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use crate::arm_fit::ArmFit;
 use crate::corrected_arm::CorrectedArm;
+use crate::few_joints::{self, PointGoal, has_few_joints};
 use crate::handeye::draw::Draw;
 use crate::handeye::joint::ArmErrors;
 use crate::handeye::{HandEye, Mode};
@@ -45,6 +47,8 @@ const PIVOTS: usize = 8;
 const ARRIVED: f64 = 1e-7;
 /// Largest tilt of the tool, radians.
 const TILT_RAD: f64 = 15.0 * std::f64::consts::PI / 180.0;
+/// Largest angle between the wanted direction of the tool and the nearest one of an arm with few joints, radians.
+const TURN_OF_FEW_JOINTS: f64 = 30.0 * std::f64::consts::PI / 180.0;
 /// Share of errors within the stated one.
 const LEVEL: f64 = 0.95;
 /// Step of differences: metres and radians, of functions that vary over lengths of a metre.
@@ -171,15 +175,13 @@ pub(crate) struct Plan {
 }
 
 impl Reach {
-    /// The reach of a session whose arm is known; `answer` is the calibration by reported poses, `tool` where the tip of the tool
-    /// is in the frame of the tip, metres, and `is_corrected` whether commands can be corrected, which is possible where the
-    /// reported poses are those of the chain. `None` without views, and for a covariance that is not valid.
+    /// The reach of a session whose arm is known; `answer` is the calibration by reported poses, and `is_corrected` whether
+    /// commands can be corrected, which is possible where the reported poses are those of the chain. `None` without views, and for a covariance that is not valid.
     pub(crate) fn new(
         (arm, fit): (&CorrectedArm, &ArmFit),
         answer: &HandEye,
         views: Vec<Seen>,
         target: &TargetSpec,
-        tool: &Vector3<f64>,
         is_corrected: bool,
     ) -> Option<Self> {
         let as_it_is = CorrectedArm { errors: ArmErrors::none(fit.errors.joint_count()), ..arm.clone() };
@@ -195,7 +197,7 @@ impl Reach {
             corrected: Way { hand_eye: fit.hand_eye, arm: arm.clone(), axis },
             views,
             turned,
-            tool: *tool,
+            tool: arm.tool_m,
             turns,
             repeated: possible.iter().map(best).collect(),
             possible,
@@ -275,7 +277,7 @@ impl Reach {
         let pivots = way.pivots(&touches[0], &self.turns, &self.views, &self.tool);
         let best = Possible { unexplained: Unexplained::nothing(), ..self.repeated[0].clone() };
         let misses = |truth: &Possible| -> Option<DVector<f64>> {
-            let found = way.tool_by(&pivots, truth, &self.tool)?;
+            let found = way.tool_by(&pivots, &touches, truth, &self.tool)?;
             let each = touches.iter().flat_map(|touch| {
                 let miss: [f64; 3] = Way::miss(touch, truth, &self.tool, &found).into();
                 miss
@@ -311,7 +313,7 @@ impl Reach {
         let pivots = way.pivots(&touches[0], &self.turns, &self.views, &self.tool);
         let mut distances: Vec<f64> = Vec::with_capacity(truths.len() * touches.len());
         for (k, truth) in truths.iter().enumerate() {
-            let found = way.tool_by(&pivots, truth, &self.tool)?;
+            let found = way.tool_by(&pivots, touches, truth, &self.tool)?;
             let its_touches = touches.iter().skip(k % APART).step_by(APART);
             distances.extend(its_touches.map(|touch| Way::miss(touch, truth, &self.tool, &found).norm()));
         }
@@ -329,15 +331,24 @@ impl Way {
         let turn = along(self.hand_eye.mode(), &base_from_camera, &seen.camera_from_target, &self.axis) * plan.turn;
         let point = base_from_camera * in_camera;
         let goal = Isometry3::from_parts((point.coords - turn * tool).into(), turn);
-        Some(Touch { view, command: self.at(&goal, &seen.joints_rad)?, in_camera, turn })
+        let command = self.at(&goal, &seen.joints_rad)?;
+        let turn = if has_few_joints(&self.arm) { command.tip(&self.arm.errors).rotation } else { turn };
+        Some(Touch { view, command, in_camera, turn })
     }
 
-    /// The arm commanded to a goal as modelled by this way.
+    /// The arm commanded to a goal as modelled by this way; the tip of the tool alone arrives where it has few joints.
     fn at(&self, goal: &Isometry3<f64>, near: &[f64]) -> Option<At> {
-        At::new(&self.arm.arm, &self.arm.joints_for(&Pose::from_isometry(*goal), near, ARRIVED).ok()?)
+        let goal = Pose::from_isometry(*goal);
+        let joints_rad = if has_few_joints(&self.arm) {
+            let goal = PointGoal { base_from_tip: &goal, free_about_tool: true, turn_rad: TURN_OF_FEW_JOINTS };
+            few_joints::joints_for(&self.arm, &goal, near, ARRIVED)
+        } else {
+            self.arm.joints_for(&goal, near, ARRIVED)
+        };
+        At::new(&self.arm.arm, &joints_rad.ok()?)
     }
 
-    /// The arm at turns about the point of a touch.
+    /// The arm at turns about the point of a touch; none where it has too few joints for them.
     fn pivots(
         &self,
         touch: &Touch,
@@ -345,6 +356,9 @@ impl Way {
         views: &[Seen],
         tool: &Vector3<f64>,
     ) -> Vec<(At, UnitQuaternion<f64>)> {
+        if has_few_joints(&self.arm) {
+            return Vec::new();
+        }
         let tip = touch.command.tip(&self.arm.errors);
         let point = tip * Point3::from(*tool);
         let at = |turn: &UnitQuaternion<f64>| {
@@ -361,9 +375,13 @@ impl Way {
     fn tool_by(
         &self,
         pivots: &[(At, UnitQuaternion<f64>)],
+        touches: &[Touch],
         truth: &Possible,
         tool: &Vector3<f64>,
     ) -> Option<Vector3<f64>> {
+        if has_few_joints(&self.arm) {
+            return Some(Self::tool_by_touching(touches, truth, tool));
+        }
         let (mut information, mut right) = (Matrix6::zeros(), Vector6::zeros());
         for ((at, turn), unexplained) in pivots.iter().zip(&truth.unexplained.pivots) {
             let believed_from_true = at.tip(&self.arm.errors).inverse() * at.tip(&truth.errors) * unexplained;
@@ -376,6 +394,22 @@ impl Way {
             return Some(*tool);
         }
         Some(Cholesky::new(information)?.solve(&right).fixed_rows::<3>(0).into_owned())
+    }
+
+    /// Where touches of points that the camera saw find the tip of the tool: the mean of what each of them is off.
+    fn tool_by_touching(touches: &[Touch], truth: &Possible, tool: &Vector3<f64>) -> Vector3<f64> {
+        let apart = touches.len().div_ceil(PIVOTS);
+        let found: Vec<Vector3<f64>> = touches
+            .iter()
+            .step_by(apart)
+            .zip(truth.unexplained.pivots.iter().zip(truth.unexplained.pivots.iter().rev()))
+            .map(|(touch, (at_view, at_touch))| {
+                let unexplained = Unexplained { view: *at_view, touch: *at_touch, ..truth.unexplained.clone() };
+                let truth = Possible { unexplained, ..truth.clone() };
+                tool + touch.turn.inverse() * Self::miss(touch, &truth, tool, tool)
+            })
+            .collect();
+        found.iter().sum::<Vector3<f64>>() / found.len() as f64
     }
 
     /// Vector from the point to the tip of the tool.

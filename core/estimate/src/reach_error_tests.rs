@@ -28,8 +28,7 @@ fn stated(session: &Session, found: &Fit, seen: &[Seen]) -> Option<ReachErrors> 
 fn reach(session: &Session, found: &Fit, seen: &[Seen]) -> Option<Reach> {
     let fit = found.joint.as_ref()?.arm.as_ref()?;
     let arm = CorrectedArm::new(ArmKind::Ur5.arm(), fit)?;
-    let tool = Vector3::z() * USUAL_TOOL_M;
-    Reach::new((&arm, fit), found.hand_eye.as_ref()?, seen.to_vec(), &session.target, &tool, true)
+    Reach::new((&arm, fit), found.hand_eye.as_ref()?, seen.to_vec(), &session.target, true)
 }
 
 #[test]

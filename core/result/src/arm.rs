@@ -235,6 +235,7 @@ impl ArmEstimate {
                 scale: self.region_scale,
                 ..SmallSample::KNOWN
             },
+            tool_m: self.tool_m.into(),
         })
     }
 

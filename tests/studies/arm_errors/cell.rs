@@ -15,7 +15,7 @@ use nalgebra::{
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 
-use crate::chain::{Chain, Model, between, newton};
+use crate::chain::{Chain, Model, between, nearest, newton};
 use crate::real::Real;
 
 pub const TARGET: TargetSpec = TargetSpec::Chessboard(Grid { columns: 9, rows: 6, square_m: 0.025 });
@@ -23,6 +23,14 @@ const CORNER_PX: f64 = 0.1;
 const TOOL_M: f64 = 0.12;
 /// Draws at most until as many views or touches are within reach.
 pub const TRIES: usize = 2000;
+/// Joints of an arm that reaches poses in general.
+const JOINTS_OF_A_POSE: usize = 6;
+/// Largest angle between the wanted direction of the tool and the nearest one of an arm with fewer.
+const NEAR_RAD: f64 = 30.0 * std::f64::consts::PI / 180.0;
+/// What a radian of that counts, next to a metre: the tip of the tool arrives.
+const TURN_M: f64 = 1e-4;
+/// How far its joints are from its start in a view, radians, the standard deviation.
+const JOINTS_RAD: f64 = 0.35;
 /// Rotations about one point from which a tool is found.
 const TURNS: usize = 12;
 const CONE: Cone =
@@ -109,7 +117,7 @@ impl Cell {
         let turned_over = UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI);
         let centred = Translation3::from(-TARGET.centre().coords);
         // Before the camera: a target's z axis points away from the viewer.
-        let before = Isometry3::translation(0.0, 0.0, 0.4) * centred;
+        let before = Isometry3::translation(0.0, 0.0, if believed.links.len() < JOINTS_OF_A_POSE { 0.25 } else { 0.4 }) * centred;
         let tip = believed.forward(&start);
         let universal = name.starts_with("ur");
         let reach = -(believed.links[2].place.x + believed.links[3].place.x);
@@ -141,10 +149,28 @@ impl Cell {
         Self { wrong, board: wrong.board(rng), lens: wrong.lens(rng), ..self }
     }
 
+    /// Whether it does not reach poses in general: then the tip of the tool arrives, along its direction as nearly as it can.
+    pub fn has_few_joints(&self) -> bool {
+        self.believed.links.len() < JOINTS_OF_A_POSE
+    }
+
     /// Joint values that put the tip at a pose as the controller believes, within the ranges of the arm.
     pub fn believed_joints(&self, goal: &Isometry3<f64>, near: &[f64]) -> Option<Vec<f64>> {
         let joints = newton(|q| self.believed.forward(q), near, |tip| between(tip, goal))?;
-        self.arm.joints().iter().zip(&joints).all(|(joint, value)| joint.range.contains(*value)).then_some(joints)
+        self.is_in_range(&joints).then_some(joints)
+    }
+
+    /// The same for a tool: with few joints its tip alone arrives.
+    pub fn believed_touch(&self, goal: &Isometry3<f64>, tool: &Vector3<f64>, near: &[f64]) -> Option<Vec<f64>> {
+        if !self.has_few_joints() {
+            return self.believed_joints(goal, near);
+        }
+        let joints = touching(|q| self.believed.forward(q), goal, tool, near)?;
+        self.is_in_range(&joints).then_some(joints)
+    }
+
+    fn is_in_range(&self, joints: &[f64]) -> bool {
+        self.arm.joints().iter().zip(joints).all(|(joint, value)| joint.range.contains(*value))
     }
 
     /// Where the tip is when it is sent to joint values: it does not return to exactly the same place.
@@ -210,6 +236,10 @@ impl Cell {
     }
 
     fn view(&self, rng: &mut ChaCha8Rng) -> Option<Taken> {
+        if self.has_few_joints() {
+            let joints: Vec<f64> = self.start.iter().map(|angle| angle + JOINTS_RAD * normal(rng)).collect();
+            return if self.is_in_range(&joints) { self.view_at(joints, rng) } else { None };
+        }
         let wanted = self.tip_for(&CONE.draw(&TARGET, rng));
         let near = self.near_start(rng);
         self.view_at(self.believed_joints(&wanted, &near)?, rng)
@@ -287,6 +317,34 @@ impl Cell {
         Some((normal_matrix.try_inverse()? * right).fixed_rows::<3>(0).into_owned())
     }
 
+    /// The same from points that the camera saw, where its frame is `mounted`: an operator moves the tip of the tool to each of them.
+    pub fn tool_by_touching(
+        &self,
+        believed: impl Fn(&[f64]) -> Isometry3<f64>,
+        mounted: &Isometry3<f64>,
+        taken: &[Taken],
+        rng: &mut ChaCha8Rng,
+    ) -> Option<Vector3<f64>> {
+        let mut found = Vec::new();
+        for _ in 0..TRIES {
+            if found.len() == TURNS {
+                break;
+            }
+            let view = &taken[rng.random_range(0..taken.len())];
+            let (in_camera, truth) = self.point(view, rng);
+            let near = Isometry3::from_parts(truth.coords.into(), self.down(taken, rng)) * self.tool.inverse();
+            let tool = self.tool.translation.vector;
+            let Some(joints) = self.believed_touch(&near, &tool, &view.joints) else { continue };
+            let [metres, radians] = self.repeats;
+            let unreported = shift_and_turn(&noise_twist(rng, metres, radians));
+            let jogged = touching(|q| self.real.tip(q) * unreported, &near, &tool, &joints);
+            let Some(joints) = jogged else { continue };
+            let seen = self.camera_at(&believed(&view.joints), mounted) * in_camera;
+            found.push((believed(&joints).inverse() * seen).coords);
+        }
+        (found.len() == TURNS).then(|| found.iter().sum::<Vector3<f64>>() / TURNS as f64)
+    }
+
     /// A point that the camera saw: in its frame, and in the base.
     pub fn point(&self, view: &Taken, rng: &mut ChaCha8Rng) -> (Point3<f64>, Point3<f64>) {
         let corner: Point3<f64> = self.board[rng.random_range(0..self.board.len())];
@@ -316,4 +374,24 @@ impl Cell {
     pub fn off(&self, joints: &[f64], point: &Point3<f64>, rng: &mut ChaCha8Rng) -> f64 {
         ((self.sent(joints, rng) * self.tool).translation.vector - point.coords).norm()
     }
+}
+
+/// Joint values of a chain with few joints that take the tip of a tool where a pose of its tip has it, its z axis as nearly as
+/// possible along that of the pose.
+fn touching(
+    forward: impl Fn(&[f64]) -> Isometry3<f64>,
+    goal: &Isometry3<f64>,
+    tool: &Vector3<f64>,
+    near: &[f64],
+) -> Option<Vec<f64>> {
+    let direction = |pose: &Isometry3<f64>| pose.rotation * Vector3::z();
+    let off = |tip: &Isometry3<f64>| {
+        let shift = tip * Point3::from(*tool) - goal * Point3::from(*tool);
+        let turn = (direction(tip) - direction(goal)) * TURN_M;
+        Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
+    };
+    let joints = nearest(&forward, near, off)?;
+    let tip = forward(&joints);
+    let arrives = off(&tip).fixed_rows::<3>(0).norm() < 1e-6;
+    (arrives && direction(&tip).angle(&direction(goal)) < NEAR_RAD).then_some(joints)
 }

@@ -14,11 +14,12 @@ pub struct Link {
     pub turn: Vector3<f64>,
 }
 
-/// A chain from the base to the tip, which is at some length after the last joint along its axis.
+/// A chain from the base to the tip.
 #[derive(Clone)]
 pub struct Chain {
     pub links: Vec<Link>,
-    pub flange_m: f64,
+    /// The tip in the frame of the last joint.
+    pub flange: Isometry3<f64>,
 }
 
 /// The name of an arm, its pose before its work, and its masses, kilograms after each joint.
@@ -27,11 +28,13 @@ pub struct Model {
     pub start: Vec<f64>,
     pub masses_kg: Vec<f64>,
     pub arm: Arm,
+    /// Another arm of its maker, or one with other lengths.
+    pub other: Chain,
 }
 
 impl Chain {
     pub fn forward(&self, joints: &[f64]) -> Isometry3<f64> {
-        self.frames(joints).last().copied().unwrap_or_else(Isometry3::identity) * self.flange()
+        self.frames(joints).last().copied().unwrap_or_else(Isometry3::identity) * self.flange
     }
 
     /// The frame after each joint, in the base.
@@ -46,8 +49,11 @@ impl Chain {
         behind.collect()
     }
 
-    pub fn flange(&self) -> Translation3<f64> {
-        Translation3::new(0.0, 0.0, self.flange_m)
+    /// The same with lengths that are 5 % longer in its first half and 5 % shorter in its second.
+    fn of_other_lengths(&self) -> Self {
+        let factor = |j: usize| if 2 * j < self.links.len() { 1.05 } else { 0.95 };
+        let other = |(j, link): (usize, &Link)| Link { place: link.place * factor(j), ..*link };
+        Self { links: self.links.iter().enumerate().map(other).collect(), ..self.clone() }
     }
 
     fn of(links: &[([f64; 3], [f64; 3])], flange_m: f64) -> Self {
@@ -55,7 +61,7 @@ impl Chain {
             place: Vector3::from(*place) * 1e-3,
             turn: Vector3::from(*turn) * std::f64::consts::FRAC_PI_2,
         };
-        Self { links: links.iter().map(link).collect(), flange_m }
+        Self { links: links.iter().map(link).collect(), flange: Isometry3::translation(0.0, 0.0, flange_m) }
     }
 
     /// The numbers of the data sheet: millimetres and quarter turns.
@@ -71,6 +77,17 @@ impl Chain {
                 ([88.0, 0.0, 0.0], [1.0, 0.0, 0.0]),
             ];
             return Some(Self::of(&links, 0.107));
+        }
+        if model == "four" {
+            let links = [
+                ([12.0, 0.0, 17.0], [0.0; 3]),
+                ([0.0, 0.0, 59.5], [-1.0, 0.0, 0.0]),
+                ([24.0, -128.0, 0.0], [0.0; 3]),
+                ([124.0, 0.0, 0.0], [0.0; 3]),
+            ];
+            let hand = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), std::f64::consts::FRAC_PI_2);
+            let flange = Isometry3::from_parts(Translation3::new(0.126, 0.0, 0.0), hand);
+            return Some(Self { flange, ..Self::of(&links, 0.0) });
         }
         if model == "xarm6" {
             let links = [
@@ -110,14 +127,17 @@ pub fn model(name: &str) -> Result<Model, Failure> {
     let (start, masses_kg): (Vec<f64>, Vec<f64>) = match name {
         "panda" => (vec![0.0, -0.5, 0.0, -2.3, 0.0, 1.8, 0.8], vec![3.1, 2.3, 3.2, 2.6, 2.1, 1.5, 0.7]),
         "xarm6" => (vec![0.0, -0.3, -0.9, 0.0, 1.2, 0.0], vec![2.4, 2.0, 1.7, 1.2, 1.2, 0.2]),
+        "four" => (vec![0.0, -0.6, 0.4, 1.5], vec![0.1, 0.15, 0.15, 0.2]),
         _ => (vec![0.0, -1.6, 1.9, -1.8, -1.57, 0.0], vec![3.8, 8.1, 2.8, 1.4, 1.3, 0.4]),
     };
     let arm = match name {
         "panda" => testing::PANDA.arm()?,
         "xarm6" => testing::XARM6.arm()?,
+        "four" => testing::FOUR_JOINTS.arm()?,
         _ => ArmKind::ALL.into_iter().find(|kind| kind.name() == name).map(ArmKind::arm).ok_or("no such arm")?,
     };
-    Ok(Model { believed, start, masses_kg, arm })
+    let other = if name == "ur5e" { Chain::nominal("ur5") } else { None }.unwrap_or_else(|| believed.of_other_lengths());
+    Ok(Model { believed, start, masses_kg, arm, other })
 }
 
 /// Newton's method on joints from `near`; `None` if it does not converge.
@@ -150,6 +170,33 @@ pub fn newton(
     None
 }
 
+/// Joint values with which a function of the pose is least, from `near`: for chains that do not reach poses in general.
+pub fn nearest(
+    forward: impl Fn(&[f64]) -> Isometry3<f64>,
+    near: &[f64],
+    off: impl Fn(&Isometry3<f64>) -> Vector6<f64>,
+) -> Option<Vec<f64>> {
+    let mut joints = near.to_vec();
+    for _ in 0..200 {
+        let here = off(&forward(&joints));
+        let columns: Vec<Vector6<f64>> = (0..joints.len())
+            .map(|j| {
+                let mut moved = joints.clone();
+                moved[j] += 1e-6;
+                (off(&forward(&moved)) - here) / 1e-6
+            })
+            .collect();
+        let by_joints = Matrix6xX::from_columns(&columns);
+        let step = by_joints.clone().svd(true, true).solve(&-here, 1e-9).ok()?;
+        let shorter = 0.2 / step.amax().max(0.2);
+        joints.iter_mut().zip(step.iter()).for_each(|(q, s)| *q += s * shorter);
+        if step.amax() < 1e-8 {
+            return Some(joints);
+        }
+    }
+    None
+}
+
 /// What takes a pose to another, by its translation and its rotation vector.
 pub fn between(tip: &Isometry3<f64>, goal: &Isometry3<f64>) -> Vector6<f64> {
     let off = tip.inverse() * goal;
@@ -168,7 +215,7 @@ pub fn read(csv: &str) -> Result<BTreeMap<usize, (String, Chain)>, Failure> {
             place: Vector3::new(number(3)?, number(4)?, number(5)?),
             turn: Vector3::new(number(6)?, number(7)?, number(8)?),
         };
-        let of_arm = || (fields[1].to_owned(), Chain { links: Vec::new(), flange_m: 0.0 });
+        let of_arm = || (fields[1].to_owned(), Chain { links: Vec::new(), flange: Isometry3::identity() });
         arms.entry(fields[0].parse()?).or_insert_with(of_arm).1.links.push(link);
     }
     Ok(arms)

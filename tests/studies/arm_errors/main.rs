@@ -5,7 +5,7 @@
 //! With a CSV of factory calibrations (its columns: `arm, model, link, x_m, y_m, z_m, roll_rad, pitch_rad, yaw_rad`) an arm moves
 //! according to it, and its controller believes the numbers of the data sheet: one session per arm and set-up. With `joints` the
 //! joints yield under 2 kg and have gears as well; with `exact` the arms are as in their data sheets. With the name of an arm
-//! (`ur5e`, `panda`, `xarm6`) errors of each kind are drawn, one arm per session; with `bent`, `square`, `lens-off` or `late`
+//! (`ur5e`, `panda`, `xarm6`, `four`) errors of each kind are drawn, one arm per session; with `bent`, `square`, `lens-off` or `late`
 //! something else is wrong as well. With `poses` no joints are known, only the accuracy of the robot: its error over 300 views,
 //! with base and tip where that is least. `accuracy` is the stated accuracy of the given lens, which is otherwise taken as exact.
 //!

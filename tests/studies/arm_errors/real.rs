@@ -37,10 +37,12 @@ pub enum Kind {
     Affine,
     /// It repeats to 0.1 mm and 0.02°.
     White,
+    /// It is another arm of its maker, or one whose first links are 5 % longer and the others 5 % shorter.
+    Another,
 }
 
 impl Kind {
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Exact,
         Self::HalfLinks,
         Self::Links,
@@ -53,6 +55,7 @@ impl Kind {
         Self::All,
         Self::Affine,
         Self::White,
+        Self::Another,
     ];
 
     pub fn name(self) -> &'static str {
@@ -69,6 +72,7 @@ impl Kind {
             Self::All => "all, 2 kg",
             Self::Affine => "affine in the base",
             Self::White => "white",
+            Self::Another => "another arm",
         }
     }
 
@@ -76,7 +80,14 @@ impl Kind {
     pub fn is_of_links(self) -> bool {
         matches!(
             self,
-            Self::Exact | Self::HalfLinks | Self::Links | Self::TwiceLinks | Self::Zeros | Self::LongLink | Self::White
+            Self::Exact
+                | Self::HalfLinks
+                | Self::Links
+                | Self::TwiceLinks
+                | Self::Zeros
+                | Self::LongLink
+                | Self::White
+                | Self::Another
         )
     }
 
@@ -136,6 +147,7 @@ impl Real {
         };
         match kind {
             Kind::Exact | Kind::White => Self::of_links(nominal.clone()),
+            Kind::Another => Self::of_links(model.other.clone()),
             Kind::HalfLinks => links(0.5, 0.025, rng),
             Kind::Links => links(1.0, 0.05, rng),
             Kind::TwiceLinks => links(2.0, 0.1, rng),

@@ -88,9 +88,18 @@ pub fn session(cell: &Cell, asked: Asked, seed: u64) -> Result<Touched, Failure>
     let actual =
         |joints: &[f64]| corrected.actual(joints).map_or_else(|_| Isometry3::identity(), |pose| *pose.isometry());
     let believed = |joints: &[f64]| cell.believed.forward(joints);
-    let plain_tool = cell.tool_by(believed, &taken, &mut rng).ok_or("no tool")?;
-    let corrected_tool = cell.tool_by(actual, &taken, &mut rng).ok_or("no tool")?;
     let park = calibrate(Method::ClosedForm("park_martin"))?.hand_eye.ok_or("no closed form")?;
+    let [plain_tool, park_tool, corrected_tool] = if cell.has_few_joints() {
+        let mounted = [&hand_eye, &park, &arm.hand_eye].map(|of| *of.mount_from_camera().isometry());
+        [
+            cell.tool_by_touching(believed, &mounted[0], &taken, &mut rng).ok_or("no tool")?,
+            cell.tool_by_touching(believed, &mounted[1], &taken, &mut rng).ok_or("no tool")?,
+            cell.tool_by_touching(actual, &mounted[2], &taken, &mut rng).ok_or("no tool")?,
+        ]
+    } else {
+        let plain_tool = cell.tool_by(believed, &taken, &mut rng).ok_or("no tool")?;
+        [plain_tool, plain_tool, cell.tool_by(actual, &taken, &mut rng).ok_or("no tool")?]
+    };
     let stated = calibration
         .reach_errors()
         .and_then(|reach| Some([reach.as_it_is_95_m, reach.corrected_95_m?]))
@@ -105,11 +114,14 @@ pub fn session(cell: &Cell, asked: Asked, seed: u64) -> Result<Touched, Failure>
         let (in_camera, truth) = cell.point(view, &mut rng);
         let down = cell.down(&taken, &mut rng);
         let as_it_is = Touch { view, in_camera, down, tool: plain_tool };
-        let by_controller = [&hand_eye, &park].map(|hand_eye| as_it_is.by_controller(cell, hand_eye));
+        let by_park = Touch { tool: park_tool, ..as_it_is };
+        let by_controller = [as_it_is.by_controller(cell, &hand_eye), by_park.by_controller(cell, &park)];
         let [Some(plain), Some(by_park)] = by_controller else { continue };
         // With corrected poses and commands.
         let seen = cell.camera_at(&actual(&view.joints), arm.hand_eye.mount_from_camera().isometry()) * in_camera;
+        let down = if cell.has_few_joints() { actual(&plain).rotation } else { down };
         let goal = Isometry3::from_parts(seen.coords.into(), down) * Translation3::from(-corrected_tool);
+        let corrected = corrected.clone().with_tool(corrected_tool);
         let Ok(command) = corrected.command(&Pose::from_isometry(goal), &plain) else { continue };
         let off = [plain, command.joints_rad, by_park].map(|joints| cell.off(&joints, &truth, &mut rng));
         squared = std::array::from_fn(|k| squared[k] + off[k] * off[k]);
@@ -231,6 +243,7 @@ fn accuracy(cell: &Cell, taken: &[Taken]) -> Option<[f64; 2]> {
 }
 
 /// A point that was seen, and how it should be touched.
+#[derive(Clone, Copy)]
 struct Touch<'a> {
     view: &'a Taken,
     in_camera: Point3<f64>,
@@ -246,7 +259,7 @@ impl Touch<'_> {
         let tip = cell.believed.forward(&self.view.joints);
         let seen = cell.camera_at(&tip, mounted.isometry()) * self.in_camera;
         let goal = Isometry3::from_parts(seen.coords.into(), self.down) * Translation3::from(-self.tool);
-        cell.believed_joints(&goal, &self.view.joints)
+        cell.believed_touch(&goal, &self.tool, &self.view.joints)
     }
 }
 

@@ -12,6 +12,7 @@ use handeye_estimate::diagnose::findings::{self, Finding, FindingOptions};
 use handeye_estimate::handeye::joint::{ArmErrors, ArmParameter, LinkError, SmallSample, arm_parameters};
 use handeye_estimate::handeye::screening::Distance;
 use handeye_estimate::handeye::{HandEye, Mode};
+use handeye_estimate::reach_error::USUAL_TOOL;
 use handeye_estimate::verify::{self, Predictor, Uncertainty, Verification};
 use handeye_estimate::{self as estimate, CameraKnowledge, Method, Observations, ObservedView, ViewStatus};
 use handeye_export::ExportInput;
@@ -287,6 +288,7 @@ pub fn corrected_arm() -> CorrectedArm {
         covariance: DMatrix::identity(count, count) * 1e-9,
         unexplained: (2e-5, 1e-5),
         small_sample: SmallSample::KNOWN,
+        tool_m: USUAL_TOOL.into(),
     }
 }
 

@@ -28,9 +28,12 @@ pub const XARM6_ON_TRACK: ArmFile =
     ArmFile { name: "xarm6_on_track", urdf: include_str!("arms/xarm6_on_track.urdf"), tip: "link6" };
 /// A SCARA: four joints, one of them prismatic, one without limits.
 pub const SCARA: ArmFile = ArmFile { name: "scara", urdf: include_str!("arms/scara.urdf"), tip: "tool" };
+/// Four revolute joints: it turns about the vertical and bends in one plane.
+pub const FOUR_JOINTS: ArmFile =
+    ArmFile { name: "four_joints", urdf: include_str!("arms/four_joints.urdf"), tip: "hand" };
 
 /// All of them.
-pub const ALL: [ArmFile; 5] = [UR5, PANDA, XARM6, XARM6_ON_TRACK, SCARA];
+pub const ALL: [ArmFile; 6] = [UR5, PANDA, XARM6, XARM6_ON_TRACK, SCARA, FOUR_JOINTS];
 
 impl ArmFile {
     /// The arm.

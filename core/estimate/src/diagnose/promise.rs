@@ -146,14 +146,13 @@ impl Calibration {
 pub(super) fn reach(fit: &Fit, of_views: &ArmOfViews, target: &TargetSpec) -> Option<Reach> {
     let errors = fit.arm()?;
     let placement = &of_views.placement;
-    let arm = CorrectedArm::new(placement.arm.clone(), errors)?;
+    let arm = CorrectedArm::new(placement.arm.clone(), errors)?.with_tool(of_views.tool_m.into());
     let seen = fit.views.iter().zip(&of_views.joints_rad).filter_map(|(view, joints_rad)| {
         let camera_from_target = view.camera_from_target.filter(|_| view.status == ViewStatus::Used)?;
         Some(Seen { joints_rad: joints_rad.clone()?, camera_from_target })
     });
     let is_its_own = placement.arm_of_poses().is_some();
-    let tool = Vector3::from(of_views.tool_m);
-    Reach::new((&arm, errors), fit.hand_eye.as_ref()?, seen.collect(), target, &tool, is_its_own)
+    Reach::new((&arm, errors), fit.hand_eye.as_ref()?, seen.collect(), target, is_its_own)
 }
 
 /// The robot of a calibration where only its accuracy is known, and how near a tool arrives at the target; `None` where its arm is

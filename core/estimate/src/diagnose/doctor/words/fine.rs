@@ -79,7 +79,13 @@ fn of_effect(model: &Model<'_>, judged: &Judged, effect: Effect) -> Hypothesis {
             let scale = estimate("true_over_stated_size", 1.0 + number(0), Some(sigma / 100.0), "");
             numbers.push(evidence("true_over_stated_size", 1.0 + number(0), ""));
             numbers.push(evidence("true_over_stated_size_sigma", sigma / 100.0, ""));
-            let to_do = text!("Measure the target with a ruler, over as many squares as it has.");
+            let measure = text!("Measure the target with a ruler, over as many squares as it has.");
+            // Its lengths as a whole look like the size of the target.
+            let or_arm = text!(
+                "If it is as large as stated, this is not the arm that is named, or its kinematics are wrong: correct no commands \
+                 by this calibration then."
+            );
+            let to_do = if model.arm().is_some() { Text::sentences([measure, or_arm]) } else { measure };
             (FindingCode::WrongScale, what, to_do, scale)
         }
         Effect::Warp => {
