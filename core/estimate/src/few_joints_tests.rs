@@ -49,7 +49,8 @@ fn the_tip_of_the_tool_arrives_and_turns_as_nearly_as_it_can() {
                 turn * wanted.isometry().rotation,
             ));
             let goal = PointGoal { base_from_tip: &other, free_about_tool: false, turn_rad: 1.0 };
-            let other = arm.actual(&joints_for(&arm, &goal, &JOINTS, 1e-9).expect("within reach")).expect("four joints");
+            let other =
+                arm.actual(&joints_for(&arm, &goal, &JOINTS, 1e-9).expect("within reach")).expect("four joints");
             assert!(other.isometry().rotation.angle_to(&wanted.isometry().rotation) >= off - 1e-9, "{near:?}, {bend}");
         }
     }

@@ -98,7 +98,7 @@ fn the_weight_says_how_far_small_errors_move_a_touch() {
         let planned: Vec<Plan> = planned.into_iter().step_by(APART).collect();
         let touches = reach.touches(way, &planned).expect("in reach");
         let pivots = way.pivots(&touches[0], &reach.turns, &reach.views, &reach.tool);
-        let tool = way.tool_by(&pivots, &truth, &reach.tool).expect("a tool");
+        let tool = way.tool_by(&pivots, &touches, &truth, &reach.tool).expect("a tool");
         let squares: f64 =
             touches.iter().map(|touch| Way::miss(touch, &truth, &reach.tool, &tool).norm_squared()).sum();
         let moved_m = (squares / touches.len() as f64).sqrt();

@@ -117,7 +117,8 @@ impl Cell {
         let turned_over = UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI);
         let centred = Translation3::from(-TARGET.centre().coords);
         // Before the camera: a target's z axis points away from the viewer.
-        let before = Isometry3::translation(0.0, 0.0, if believed.links.len() < JOINTS_OF_A_POSE { 0.25 } else { 0.4 }) * centred;
+        let before = Isometry3::translation(0.0, 0.0, if believed.links.len() < JOINTS_OF_A_POSE { 0.25 } else { 0.4 })
+            * centred;
         let tip = believed.forward(&start);
         let universal = name.starts_with("ur");
         let reach = -(believed.links[2].place.x + believed.links[3].place.x);

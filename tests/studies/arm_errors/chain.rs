@@ -136,7 +136,8 @@ pub fn model(name: &str) -> Result<Model, Failure> {
         "four" => testing::FOUR_JOINTS.arm()?,
         _ => ArmKind::ALL.into_iter().find(|kind| kind.name() == name).map(ArmKind::arm).ok_or("no such arm")?,
     };
-    let other = if name == "ur5e" { Chain::nominal("ur5") } else { None }.unwrap_or_else(|| believed.of_other_lengths());
+    let other =
+        if name == "ur5e" { Chain::nominal("ur5") } else { None }.unwrap_or_else(|| believed.of_other_lengths());
     Ok(Model { believed, start, masses_kg, arm, other })
 }
 
