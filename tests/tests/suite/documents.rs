@@ -11,7 +11,7 @@ const TOP: [&str; 9] = [".ci", ".github", "app", "assets", "core", "docs", "scri
 const SOURCES: [&str; 3] = ["rs", "py", "js"];
 /// Names of what existed when a line was written.
 const HISTORY: &str = "CHANGELOG.md";
-/// Words of all pages but the studies, which are measured tables.
+/// Words of all pages but the studies, which are measured tables, and translations.
 const MOST_WORDS: usize = 45_000;
 /// Words of README.md.
 const MOST_WORDS_OF_README: usize = 900;
@@ -190,18 +190,41 @@ fn the_index_has_every_page() {
         .into_iter()
         .map(|link| plain(&Path::new("docs").join(link.split('#').next().unwrap_or_default())))
         .collect();
-    let part_of_a_list = |file: &str| file.starts_with("docs/decisions/0");
+    // Linked from the list of decisions, and from the page in English.
+    let part_of_a_list = |file: &str| file.starts_with("docs/decisions/0") || is_translated(file);
     let pages = all_files().into_iter().filter(|file| file.starts_with("docs/") && ending(file) == "md");
     let missing: Vec<String> =
         pages.filter(|file| file != "docs/README.md" && !part_of_a_list(file) && !linked.contains(file)).collect();
     assert!(missing.is_empty(), "docs/README.md does not link to {missing:?}");
 }
 
+/// Whether a page is in the folder of translations, next to the page in English.
+fn is_translated(page: &str) -> bool {
+    page.contains("/zh-CN/")
+}
+
+/// Blocks of code are run as the page in English has them, so a translation has the same.
+#[test]
+fn a_translated_page_has_the_code_and_as_many_links_as_that_in_english() {
+    let files = all_files();
+    let how_to = |file: &&String| Path::new(file).parent() == Some(Path::new("docs/howto")) && ending(file) == "md";
+    let pages: Vec<&String> = files.iter().filter(how_to).collect();
+    assert!(!pages.is_empty());
+    for page in pages {
+        let translated = page.replace("docs/howto/", "docs/howto/zh-CN/");
+        assert!(files.contains(&translated), "no {translated}");
+        let [english, chinese] = [page, &translated].map(|file| read(file));
+        let [(prose, code), (other_prose, other_code)] = [&english, &chinese].map(|text| prose_and_code(text));
+        assert_eq!(other_code, code, "{translated}");
+        assert_eq!(links(&other_prose).len(), links(&prose).len(), "{translated}");
+    }
+}
+
 #[test]
 fn the_documents_are_no_longer_than_a_person_reads() {
     let pages = all_files().into_iter().filter(|file| file.starts_with("docs/") && ending(file) == "md");
     let words: usize = pages
-        .filter(|file| !file.starts_with("docs/studies/"))
+        .filter(|file| !file.starts_with("docs/studies/") && !is_translated(file))
         .map(|file| read(&file).split_whitespace().count())
         .sum();
     assert!(words <= MOST_WORDS, "{words} words in docs without studies");
