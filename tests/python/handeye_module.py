@@ -22,7 +22,7 @@ import numpy as np
 
 import handeye
 import simulated
-from simulated import BASE_FROM_TARGET, MATRIX, POINTS, SIZE, TIP_FROM_CAMERA, inverse, pose, session
+from simulated import BASE_FROM_TARGET, MATRIX, POINTS, SIZE, TIP_FROM_CAMERA, inverse, pose, session, write_folder
 
 BOARD = handeye.Target.chessboard(simulated.COLUMNS, simulated.ROWS, simulated.SQUARE_M)
 LENS = handeye.Intrinsics.from_opencv(MATRIX, None, SIZE)
@@ -301,42 +301,6 @@ def data_without_an_answer_say_what_to_capture(rng):
     assert diagnosis.untested and not diagnosis.is_healthy
 
 
-def write_folder(folder, s, corners=True, images=(), joints=None):
-    os.makedirs(folder)
-    names = [f"images/{i:03}.png" for i in range(len(s.base_from_tip))]
-    rows = lambda poses: "".join(
-        f"{name}," + ",".join(repr(float(v)) for v in [*p[:3, 3], *p[:3, :3].ravel()]) + "\n" for name, p in zip(names, poses))
-    header = "image,x,y,z," + ",".join(f"r{r}{c}" for r in "123" for c in "123") + "\n"
-    files = {"poses.csv": header + rows(s.base_from_tip)}
-    if joints is not None:
-        lines = files["poses.csv"].splitlines()
-        columns = [[f"q{i}" for i in range(1, 7)], *([repr(float(v)) for v in q] for q in joints)]
-        files["poses.csv"] = "".join(",".join([line, *values]) + "\n" for line, values in zip(lines, columns))
-    if corners:
-        source = 'corners = "corners.csv"'
-        lines = [f"{name},{i % 10},{i // 10},{float(u)!r},{float(v)!r}\n"
-                 for name, seen in zip(names, s.corners) for i, (u, v) in enumerate(seen)]
-        files["corners.csv"] = "image,column,row,u,v\n" + "".join(lines)
-    elif not images:
-        source = 'poses = "target_poses.csv"'
-        files["target_poses.csv"] = header + rows(s.camera_from_target)
-    else:
-        source = ""
-    files["dataset.toml"] = (
-        f'mode = "eye_in_hand"\n[target]\nkind = "chessboard"\ncolumns = 10\nrows = 7\nsquare_m = 0.015\n{source}\n'
-        '[robot]\nposes = "poses.csv"\nlength_unit = "m"\nrotation = "matrix"\npose = "base_from_tip"\n')
-    if joints is not None:
-        files["dataset.toml"] += 'joints = 6\njoint_unit = "rad"\n[robot.arm]\nkind = "ur5e"\n'
-    if corners:
-        files["dataset.toml"] += "[camera]\nfixed = false\nwidth = 640\nheight = 480\n"
-    for name, text in files.items():
-        with open(os.path.join(folder, name), "w") as file:
-            file.write(text)
-    for name in names if images else ():
-        os.makedirs(os.path.join(folder, "images"), exist_ok=True)
-        cv2.imwrite(os.path.join(folder, name), np.zeros((48, 64), np.uint8))
-
-
 @check
 def a_folder_reads_to_the_numbers_in_it_and_solves_as_on_the_command_line(rng):
     binary, folder = sys.argv[1], sys.argv[3]
@@ -383,6 +347,30 @@ def a_folder_reads_to_the_numbers_in_it_and_solves_as_on_the_command_line(rng):
     with open(os.path.join(path, "poses.csv"), "a") as file:
         file.write("images/099.png,1\n")
     raises(handeye.InputError, ["poses.csv", "14"], handeye.load_dataset, path)
+
+
+@check
+def a_folder_of_images_is_calibrated_by_the_program_and_one_of_corners_without_it(rng):
+    binary, folder = sys.argv[1], sys.argv[3]
+    by_program = lambda path: json.loads(subprocess.run(
+        [binary, "calibrate", path, "--quiet", "--json", "-"], check=True, stdout=subprocess.PIPE).stdout)
+    images, corners = (os.path.join(folder, name) for name in ("sample", "of_corners"))
+    subprocess.run([binary, "sample", "--out", images, "--quiet"], check=True)
+    write_folder(corners, session(rng, 8, 0.1, 0.1, 0.02))
+    path = os.environ["PATH"]
+    os.environ["PATH"] = os.path.dirname(binary)
+    try:
+        before = sorted(os.listdir(images))
+        assert handeye.calibrate_dataset(images).document == by_program(images)
+        assert sorted(os.listdir(images)) == before
+        raises(handeye.InputError, ["nowhere"], handeye.calibrate_dataset, os.path.join(folder, "nowhere"))
+        os.remove(os.path.join(images, "images", sorted(os.listdir(os.path.join(images, "images")))[0]))
+        raises(handeye.InputError, ["images/"], handeye.calibrate_dataset, images)
+        os.environ["PATH"] = ""
+        raises(handeye.InputError, ["table of corners"], handeye.calibrate_dataset, images)
+        assert handeye.calibrate_dataset(corners).document == by_program(corners)
+    finally:
+        os.environ["PATH"] = path
 
 
 @check

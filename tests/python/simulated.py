@@ -1,5 +1,6 @@
 """Sessions of which the truth is known: a camera on a robot's tip, a chessboard, corners with noise and reported poses."""
 
+import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -144,3 +145,42 @@ def arm_session(rng, views, rows, corner_px=0.1):
 def error(tip_from_camera, truth=TIP_FROM_CAMERA):
     """Of a hand-eye transform: millimetres, degrees."""
     return 1e3 * np.linalg.norm(tip_from_camera[:3, 3] - truth[:3, 3]), angle_deg(tip_from_camera, truth)
+
+
+def write_folder(folder, s, corners=True, images=False, joints=None):
+    """The session as a dataset folder (docs/reference/dataset.md): corners, images without a board, or poses of the target."""
+    os.makedirs(folder)
+    names = [f"images/{i:03}.png" for i in range(len(s.base_from_tip))]
+    rows = lambda poses: "".join(
+        f"{name}," + ",".join(repr(float(v)) for v in [*p[:3, 3], *p[:3, :3].ravel()]) + "\n" for name, p in zip(names, poses))
+    header = "image,x,y,z," + ",".join(f"r{r}{c}" for r in "123" for c in "123") + "\n"
+    files = {"poses.csv": header + rows(s.base_from_tip)}
+    if joints is not None:
+        lines = files["poses.csv"].splitlines()
+        columns = [[f"q{i}" for i in range(1, 7)], *([repr(float(v)) for v in q] for q in joints)]
+        files["poses.csv"] = "".join(",".join([line, *values]) + "\n" for line, values in zip(lines, columns))
+    if corners:
+        source = 'corners = "corners.csv"'
+        lines = [f"{name},{i % 10},{i // 10},{float(u)!r},{float(v)!r}\n"
+                 for name, seen in zip(names, s.corners) for i, (u, v) in enumerate(seen)]
+        files["corners.csv"] = "image,column,row,u,v\n" + "".join(lines)
+    elif not images:
+        source = 'poses = "target_poses.csv"'
+        files["target_poses.csv"] = header + rows(s.camera_from_target)
+    else:
+        source = ""
+    files["dataset.toml"] = (
+        f'mode = "eye_in_hand"\n[target]\nkind = "chessboard"\ncolumns = 10\nrows = 7\nsquare_m = 0.015\n{source}\n'
+        '[robot]\nposes = "poses.csv"\nlength_unit = "m"\nrotation = "matrix"\npose = "base_from_tip"\n')
+    if joints is not None:
+        files["dataset.toml"] += 'joints = 6\njoint_unit = "rad"\n[robot.arm]\nkind = "ur5e"\n'
+    if corners:
+        files["dataset.toml"] += "[camera]\nfixed = false\nwidth = 640\nheight = 480\n"
+    for name, text in files.items():
+        with open(os.path.join(folder, name), "w") as file:
+            file.write(text)
+    if images:
+        import cv2
+    for name in names if images else ():
+        os.makedirs(os.path.join(folder, "images"), exist_ok=True)
+        cv2.imwrite(os.path.join(folder, name), np.zeros((48, 64), np.uint8))

@@ -1,13 +1,13 @@
 """Hand-eye calibration that says how accurate it is.
 
 `calibrate` takes corners or pose pairs as numpy arrays, `calibrate_hand_eye` the arguments of OpenCV's calibrateHandEye,
-`doctor` says what is wrong with the data, `clock_offset` relates two clocks, `load_dataset` reads a dataset folder,
-`load_calibration` a result. Transforms are 4 × 4 arrays named `dst_from_src`, lengths metres, angles radians and pixels
+`calibrate_dataset` a folder; `doctor` says what is wrong with the data, `clock_offset` relates two clocks, `load_dataset` reads
+a dataset folder, `load_calibration` a result. Transforms are 4 × 4 arrays named `dst_from_src`, lengths metres, angles radians and pixels
 OpenCV's, unless a name says otherwise.
 """
 
 from ._arm import Arm, ArmLevels, Command, JointErrors, TipPose
-from ._calibrate import calibrate, doctor
+from ._calibrate import calibrate, calibrate_dataset, doctor
 from ._clocks import ClockOffset, clock_offset, poses_at
 from ._dataset import Dataset, load_dataset
 from ._errors import CalibrationError, CalibrationWarning, HandeyeError, InputError
@@ -37,6 +37,7 @@ __all__ = [
     "View",
     "__version__",
     "calibrate",
+    "calibrate_dataset",
     "calibrate_hand_eye",
     "calibrate_robot_world_hand_eye",
     "clock_offset",

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import json
+import os
 import warnings
 from typing import Any, Callable, Optional, Sequence, Tuple, Union
 
-from . import _handeye
+from . import _handeye, _program
 from ._arm import described as described_arm
 from ._arrays import corners_of_views, joints_of_views, packed, poses
-from ._dataset import Dataset
+from ._dataset import Dataset, load_dataset
 from ._errors import CalibrationWarning, InputError
 from ._result import Calibration, Diagnosis
 from ._types import Intrinsics, Target
 
 Progress = Callable[[str, float], None]
 Modes = ("eye_in_hand", "eye_to_hand")
+# The goal of `handeye calibrate`, millimetres.
+GOAL_MM = 0.3
 
 
 def calibrate(
@@ -135,6 +138,26 @@ def calibrate(
         )
         warnings.warn(message, CalibrationWarning, stacklevel=2)
     return Calibration._of(document, sigmas)
+
+
+def calibrate_dataset(path: Union[str, "os.PathLike[str]"], *, method: str = "joint") -> Calibration:
+    """Calibrates a dataset folder or session as `handeye calibrate` does: the same folder gives the same answer. Nothing is written
+    and nothing is kept, so that any number of processes may do so at once.
+
+    Images without a table of corners are searched by the program `handeye`, of this package or installed.
+
+    Raises
+    ------
+    InputError
+        As `load_dataset`; or there are images to be searched, and no program.
+    CalibrationError
+        As `calibrate`.
+    """
+    data = load_dataset(path)
+    program = _program.find() if data._unsearched() else None
+    if program is None:
+        return calibrate(data, method=method, goal_mm=GOAL_MM)
+    return Calibration._of(_program.calibrated(program, os.fspath(path), method), None)
 
 
 def doctor(

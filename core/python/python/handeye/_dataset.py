@@ -52,10 +52,16 @@ class Dataset:
     """What the tables name outside of the folder."""
     _observations: Any = field(repr=False)
 
+    def _unsearched(self) -> int:
+        """How many images the corners or target poses would come from."""
+        if self.corners is not None or self.camera_from_target is not None:
+            return 0
+        return sum(path is not None for path in self.image_paths)
+
     def _ready(self) -> Any:
         """What is calibrated; images are not looked at by this module."""
-        unsearched = sum(path is not None for path in self.image_paths)
-        if self.corners is None and self.camera_from_target is None and unsearched:
+        unsearched = self._unsearched()
+        if unsearched:
             raise InputError(
                 f"{self.folder} has {unsearched} images and no table of corners, and this module does not search images: find "
                 "the corners with OpenCV and pass them (corners=, with base_from_tip and the rest of this data set), or run "
