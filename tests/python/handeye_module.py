@@ -364,10 +364,14 @@ def a_folder_of_images_is_calibrated_by_the_program_and_one_of_corners_without_i
         assert handeye.calibrate_dataset(images).document == by_program(images)
         assert sorted(os.listdir(images)) == before
         raises(handeye.InputError, ["nowhere"], handeye.calibrate_dataset, os.path.join(folder, "nowhere"))
-        os.remove(os.path.join(images, "images", sorted(os.listdir(os.path.join(images, "images")))[0]))
-        raises(handeye.InputError, ["images/"], handeye.calibrate_dataset, images)
         os.environ["PATH"] = ""
         raises(handeye.InputError, ["table of corners"], handeye.calibrate_dataset, images)
+        os.environ["PATH"] = os.path.dirname(binary)
+        # What the program says of images that it cannot read is said here.
+        for name in os.listdir(os.path.join(images, "images")):
+            cv2.imwrite(os.path.join(images, "images", name), np.zeros((480, 640), np.uint8))
+        raises(handeye.CalibrationError, ["0 of 12 images"], handeye.calibrate_dataset, images)
+        os.environ["PATH"] = ""
         assert handeye.calibrate_dataset(corners).document == by_program(corners)
     finally:
         os.environ["PATH"] = path

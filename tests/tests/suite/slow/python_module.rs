@@ -62,7 +62,7 @@ fn python_gets_what_opencv_the_command_line_and_the_truth_say() {
     let Some(text) = script("handeye_module.py", &[&handeye_binary(), &schema, folder.path()]) else { return };
     println!("{text}");
     // One line per check.
-    assert_eq!(text.lines().count(), 20, "{text}");
+    assert_eq!(text.lines().count(), 21, "{text}");
 }
 
 #[test]
