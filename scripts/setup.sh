@@ -1,4 +1,4 @@
-# Sourced by ./run and ./test: makes sure that the system packages and the Rust toolchain are there.
+# Sourced by ./run, ./test and scripts/package: makes sure that the system packages and the Rust toolchain are there.
 # Says what it is about to install and why; does nothing, and needs no network, when everything is there already.
 
 say() { printf '%s\n' "$*" >&2; }
@@ -33,6 +33,16 @@ xvfb : the window is driven by a real mouse in the tests
 xdotool : the window is driven by a real mouse in the tests
 imagemagick : the window is driven by a real mouse in the tests
 chromium : the recording is looked at in a browser in the tests
+PACKAGES
+  [ "${HANDEYE_SETUP_FOR:-run}" = package ] && cat <<'PACKAGES'
+binutils : the versions of the system's symbols that a package needs
+cmake : builds OpenCV to be linked in
+debian-archive-keyring : checks OpenCV's sources
+ninja-build : builds OpenCV to be linked in
+python3 : lists licences, builds the module
+python3-venv : builds the module
+zlib1g-dev : linked in, for OpenCV
+zstd : compresses the package
 PACKAGES
   return 0
 }

@@ -2,8 +2,10 @@ use std::ffi::OsString;
 
 use clap::{CommandFactory as _, Parser as _};
 
-use crate::Cli;
+use clap_complete::Shell;
+
 use crate::rerun_arg;
+use crate::{Cli, shell};
 
 /// The program and all its commands, with how each is called.
 fn commands() -> Vec<(String, clap::Command)> {
@@ -77,4 +79,31 @@ fn what_guided_capture_has_of_its_own_is_the_whole_of_its_heading() {
         .filter_map(clap::Arg::get_long)
         .collect();
     assert_eq!(guided, ["goal", "max-poses", "max-minutes", "check-poses", "box"]);
+}
+
+#[test]
+fn shells_complete_and_manual_pages_describe_every_command() {
+    let shown: Vec<String> = commands()
+        .into_iter()
+        .filter(|(_, command)| !command.is_hide_set())
+        .map(|(path, _)| path)
+        .filter(|path| path.split(' ').count() == 2)
+        .collect();
+    assert!(shown.len() > 12, "{shown:?}");
+    for shell in [Shell::Bash, Shell::Zsh, Shell::Fish] {
+        let text = shell::completions_of(shell);
+        for path in &shown {
+            let (_, name) = path.split_once(' ').expect("two words");
+            assert!(text.contains(name), "{shell}: {name}");
+        }
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("man1");
+    let man = shell::ManArgs { out: out.clone() };
+    shell::man(&man).expect("written");
+    for path in &shown {
+        let page = out.join(format!("{}.1", path.replace(' ', "-")));
+        let text = std::fs::read_to_string(&page).unwrap_or_else(|error| panic!("{}: {error}", page.display()));
+        assert!(text.contains(".SH OPTIONS"), "{path}");
+    }
 }

@@ -31,6 +31,7 @@ mod rerun_arg;
 mod robot_args;
 mod sample;
 mod shared;
+mod shell;
 mod solve;
 pub(crate) mod target;
 mod towards_board;
@@ -126,6 +127,12 @@ enum Command {
     /// Print a target as a PDF at exact physical scale, with rulers to check the print.
     #[command(after_help = target::EXAMPLES)]
     Target(target::TargetArgs),
+    /// Print the completions of these commands for a shell.
+    #[command(after_help = shell::EXAMPLES)]
+    Completions(shell::CompletionsArgs),
+    /// Write these help texts as manual pages.
+    #[command(hide = true, after_help = "Examples:\n  handeye man --out man1")]
+    Man(shell::ManArgs),
 }
 
 /// Runs the program with the arguments of the process.
@@ -181,6 +188,8 @@ pub fn main() -> ExitCode {
         Command::Import(args) => import::run(&args),
         Command::Correct(args) => correct::run(&args),
         Command::Target(args) => target::run(&args),
+        Command::Completions(args) => shell::completions(&args),
+        Command::Man(args) => shell::man(&args),
     };
     ended(result)
 }

@@ -1,6 +1,10 @@
 //! `handeye gui`, as on the command line.
 
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
 use clap::Args;
+use clap::builder::{OsStringValueParser, TypedValueParser as _};
 use handeye_cell::scene::SceneChoice;
 
 use handeye_workbench::arguments::{ArmErrorsChoice, ObjectArgs, heading};
@@ -30,10 +34,21 @@ pub struct GuiArgs {
     /// Existing file of boxes that the arm keeps out of; changes are written to it; `keep_out.toml` next to the
     /// settings if not given.
     #[arg(long, value_name = "FILE", help_heading = heading::CELL)]
-    pub keep_out: Option<std::path::PathBuf>,
-    /// Session folder to open, or to create.
-    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
-    pub session: Option<std::path::PathBuf>,
+    pub keep_out: Option<PathBuf>,
+    /// Session folder to open, or to create; or its journal.jsonl, as a file manager hands it over.
+    #[arg(long, value_name = "DIR", value_parser = OsStringValueParser::new().map(session_folder), help_heading = heading::OUTPUT)]
+    pub session: Option<PathBuf>,
+}
+
+/// The folder that is meant: a file manager opens files.
+fn session_folder(given: OsString) -> PathBuf {
+    let path = PathBuf::from(given);
+    let is_journal = path.file_name() == Some("journal.jsonl".as_ref()) && path.is_file();
+    match path.parent().filter(|_| is_journal) {
+        Some(here) if here == Path::new("") => ".".into(),
+        Some(folder) => folder.to_owned(),
+        None => path,
+    }
 }
 
 #[cfg(test)]
@@ -46,6 +61,20 @@ mod tests {
     struct Line {
         #[command(flatten)]
         gui: GuiArgs,
+    }
+
+    #[test]
+    fn the_journal_of_a_session_stands_for_its_folder() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let journal = folder.path().join("journal.jsonl");
+        let session = |path: &Path| {
+            let line = ["handeye".as_ref(), "--session".as_ref(), path.as_os_str()];
+            Line::try_parse_from(line).expect("a path").gui.session.expect("given")
+        };
+        assert_eq!(session(&journal), journal, "a session of that name may be begun");
+        std::fs::write(&journal, "").expect("written");
+        assert_eq!(session(&journal), folder.path());
+        assert_eq!(session(folder.path()), folder.path());
     }
 
     #[test]
