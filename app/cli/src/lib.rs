@@ -127,7 +127,8 @@ enum Command {
     /// Print a target as a PDF at exact physical scale, with rulers to check the print.
     #[command(after_help = target::EXAMPLES)]
     Target(target::TargetArgs),
-    /// Print the completions of these commands for a shell.
+    /// Print the completions of these commands for a shell, to be kept where it looks for them, such as
+    /// ~/.local/share/bash-completion/completions/handeye.
     #[command(after_help = shell::EXAMPLES)]
     Completions(shell::CompletionsArgs),
     /// Write these help texts as manual pages.

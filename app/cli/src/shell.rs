@@ -11,8 +11,8 @@ use crate::{Cli, Failure, out};
 
 /// At the end of the help of `handeye completions`.
 pub const EXAMPLES: &str = "Examples:
-  handeye completions bash > ~/.local/share/bash-completion/completions/handeye
-  handeye completions zsh > _handeye";
+  handeye completions bash
+  handeye completions zsh";
 
 /// Options of `handeye completions`.
 #[derive(Debug, Args)]

@@ -226,8 +226,9 @@ fn every_catalogue_can_be_read_and_no_text_is_there_twice() {
     }
 }
 
-/// What a README contains in any language: levels of headings, lines of code without their comments, documents it names.
-fn skeleton(readme: &str) -> (Vec<usize>, Vec<String>, BTreeSet<&str>) {
+/// What a README contains in any language: levels of headings, lines of code without their comments, and the documents it names,
+/// by their names in English.
+fn skeleton(readme: &str) -> (Vec<usize>, Vec<String>, BTreeSet<String>) {
     let (mut headings, mut code, mut is_code) = (Vec::new(), Vec::new(), false);
     for line in readme.lines() {
         if line.starts_with("```") {
@@ -239,7 +240,8 @@ fn skeleton(readme: &str) -> (Vec<usize>, Vec<String>, BTreeSet<&str>) {
         }
     }
     let links = readme.split("](").skip(1).filter_map(|part| part.split(')').next());
-    (headings, code, links.filter(|link| link.contains(".md") && link.starts_with("docs/")).collect())
+    let documents = links.filter(|link| link.contains(".md") && link.starts_with("docs/"));
+    (headings, code, documents.map(|link| link.replace("/zh-CN/", "/")).collect())
 }
 
 #[test]
