@@ -11,6 +11,7 @@ import re
 import shutil
 import subprocess
 import sys
+import urllib.parse
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 INDEX = pathlib.Path("docs/README.md")
@@ -62,7 +63,42 @@ def summary():
                     if child.suffix == ".md" and is_below and child not in pages:
                         pages.append(child)
                         lines.append(f"  - [{title(child)}]({child})")
+    lines += ["", "# More", ""]
+    # What these pages refer to besides, such as the style of the code, and what that refers to.
+    for page in pages:
+        for below in links(page):
+            child = within(page, below)
+            if child.suffix == ".md" and child not in pages:
+                pages.append(child)
+                lines.append(f"- [{title(child)}]({child})")
     return "\n".join(lines) + "\n", pages
+
+
+def assembled(source, pages):
+    """Copies the pages and what they link to; mdBook has the page README.md of a folder as index.md."""
+    named = lambda path: path.with_name("index.md") if path.name == "README.md" else path
+    shutil.rmtree(source, ignore_errors=True)
+    for path in sorted(set(pages).union(within(page, target) for page in pages for target in links(page))):
+        to = source / named(path)
+        to.parent.mkdir(parents=True, exist_ok=True)
+        if path.suffix == ".md":
+            text = (ROOT / path).read_text(encoding="utf-8")
+            to.write_text(re.sub(r"(\]\([^)\s]*?)README\.md", r"\1index.md", text), encoding="utf-8")
+        elif (ROOT / path).is_dir():
+            shutil.copytree(ROOT / path, to, dirs_exist_ok=True, ignore=shutil.ignore_patterns("*.md", "__pycache__"))
+        else:
+            shutil.copy(ROOT / path, to)
+    shutil.copytree(ROOT / "docs" / "images", source / "docs" / "images", dirs_exist_ok=True)
+
+
+def dead_links(out):
+    """Links of the made pages that lead nowhere."""
+    for page in sorted(out.rglob("*.html")):
+        content = page.read_text(encoding="utf-8").partition("<main>")[2].partition("</main>")[0]
+        for target in re.findall(r'(?:href|src)="([^"#]+)', content):
+            path = page.parent / urllib.parse.unquote(target)
+            if "://" not in target and not target.startswith("mailto:") and not path.exists() and page.name != "print.html":
+                yield f"{page.relative_to(out)}: {target}"
 
 
 def main():
@@ -70,19 +106,15 @@ def main():
     parser.add_argument("--out", type=pathlib.Path, default=ROOT / "target" / "book")
     out = parser.parse_args().out.resolve()
     contents, pages = summary()
-    source = out.with_name(out.name + "-source")
-    shutil.rmtree(source, ignore_errors=True)
-    shutil.copytree(ROOT / "docs", source / "src" / "docs")
-    referred = set(pages).union(within(page, target) for page in pages for target in links(page))
-    for path in sorted(referred):
-        target = source / "src" / path
-        if not target.exists():
-            target.parent.mkdir(parents=True, exist_ok=True)
-            (shutil.copytree if (ROOT / path).is_dir() else shutil.copy)(ROOT / path, target)
-    (source / "book.toml").write_text(SETTINGS)
-    (source / "src" / "SUMMARY.md").write_text(contents, encoding="utf-8")
+    work = out.with_name(out.name + "-source")
+    assembled(work / "src", pages)
+    (work / "book.toml").write_text(SETTINGS)
+    (work / "src" / "SUMMARY.md").write_text(contents.replace("README.md)", "index.md)"), encoding="utf-8")
     mdbook = shutil.which("mdbook") or sys.exit("error: mdbook is not there: cargo install --locked mdbook@0.5.4")
-    subprocess.run([mdbook, "build", "--dest-dir", str(out), str(source)], check=True)
+    subprocess.run([mdbook, "build", "--dest-dir", str(out), str(work)], check=True)
+    dead = list(dead_links(out))
+    if dead:
+        sys.exit("error: links that lead nowhere:\n  " + "\n  ".join(dead))
     print(f"{len(pages)} pages in {out / 'index.html'}")
 
 
