@@ -21,6 +21,8 @@ libopencv-dev : board detection and intrinsics
 clang : reads OpenCV's headers for the Rust bindings
 libclang-dev : reads OpenCV's headers for the Rust bindings
 libxkbcommon-x11-0 : keyboard of the window
+libxcursor1 : pointer of the window
+libxi6 : pointer of the window
 libgl1 : drawing of the window
 libegl1 : drawing of the window
 libgl1-mesa-dri : drawing of the window without a graphics card
