@@ -5,8 +5,13 @@ A driver is an object with
     open(outlet)    connects, within ten seconds, and returns what the driver's `hello` says
     run(outlet)     publishes states and images until `outlet.ended` is set
 
-and is handed to `serve`, which answers the workbench meanwhile. Such a driver only reads: a request to move is refused. Copy
-this file together with a driver; it needs nothing but Python.
+and is handed to `serve`, which answers the workbench meanwhile. Such a driver only reads: a request to move is refused. One that
+moves the arm has as well
+
+    command(message, outlet)    takes a message `arm`, `move` or `stop`, in the thread that reads, and sees to its answer
+
+and brakes when nothing was heard for a second (`outlet.last_message_s`). Copy this file together with a driver; it needs nothing
+but Python.
 """
 
 import argparse
@@ -88,6 +93,8 @@ class Outlet:
         self.clock = DeviceClock()
         self.ended = threading.Event()
         self.greeted = False
+        # When the workbench last sent anything, by `own_time`.
+        self.last_message_s = self.own_time()
         self.wanted = None
         self.newest = None
 
@@ -195,6 +202,8 @@ def answer(message, device, outlet):
         outlet.send({"type": "pong", **identity, "stamp": outlet.device_time()})
     elif kind == "next_image":
         outlet.want(message)
+    elif kind in ("arm", "move", "stop") and hasattr(device, "command"):
+        device.command(message, outlet)
     elif kind == "move" or kind == "arm" and message["on"]:
         outlet.send({"type": "refused", **identity, "why": "this driver only reads: it cannot move the arm"})
     elif kind in ("arm", "stop"):
@@ -205,6 +214,7 @@ def answer(message, device, outlet):
 def hear(line, device, outlet):
     """Takes a line of the workbench. A message of an unknown type is nothing; one that cannot be read is worth a line."""
     kind = None
+    outlet.last_message_s = outlet.own_time()
     try:
         message = json.loads(line)
         kind = message["type"]
