@@ -59,10 +59,12 @@ distortion = []
 #[test]
 fn the_program_needs_no_newer_system_than_packages_are_for() {
     const MOST: [(&str, &[u32]); 2] = [("GLIBC_", &[2, 35]), ("GLIBCXX_", &[3, 4, 30])];
-    let listed = Command::new("objdump").arg("-T").arg(handeye_binary()).output().expect("binutils, as for the compiler");
+    let listed =
+        Command::new("objdump").arg("-T").arg(handeye_binary()).output().expect("binutils, as for the compiler");
     let listed = String::from_utf8_lossy(&listed.stdout);
     for (name, most) in MOST {
-        let needed = listed.split(|c: char| c.is_whitespace() || "()".contains(c)).filter_map(|word| word.strip_prefix(name));
+        let needed =
+            listed.split(|c: char| c.is_whitespace() || "()".contains(c)).filter_map(|word| word.strip_prefix(name));
         let numbers = |version: &str| version.split('.').map_while(|part| part.parse().ok()).collect::<Vec<u32>>();
         let newest = needed.map(numbers).max().expect("it is linked to it");
         assert!(newest.as_slice() <= most, "{name}{newest:?}");
