@@ -14,10 +14,14 @@ Menagerie, to which camera and board are added. The workbench calibrates the cam
     handeye auto --driver "python3 mujoco_cell.py --truth truth.json" --allow-motion --speed 100 \\
         --target 10x7x15 --poses guided --out ur5e
 
-    handeye auto --driver "python3 mujoco_cell.py --model scene.xml --tip attachment_site --eye-to-hand" --mode eye_to_hand \\
-        --allow-motion --speed 100 --target 10x7x15 --poses guided --out other
+    handeye auto --driver "python3 mujoco_cell.py --eye-to-hand" --mode eye_to_hand --allow-motion --speed 100 \\
+        --target 10x7x15 --poses guided --out beside
 
-It needs handeye_driver.py and simulated_cell.py beside it. Run with MuJoCo 4.0.0 and 3.2.7, and EGL in software, on Python 3.11.
+    handeye auto --driver "python3 mujoco_cell.py --model scene.xml --tip attachment_site" --allow-motion --speed 100 \\
+        --target 10x7x15 --poses guided --out other
+
+It needs handeye_driver.py and simulated_cell.py beside it. Run with MuJoCo 3.2.7, 3.3.7 and 4.0.0 by EGL in software, on Python
+3.9 and 3.11; OSMesa gave the same image as EGL.
 """
 
 import ctypes.util

@@ -16,7 +16,8 @@ that PyBullet loads. The workbench calibrates the camera on the arm, or with --e
     handeye auto --driver "python3 pybullet_cell.py --arm xarm6 --eye-to-hand" --mode eye_to_hand --allow-motion --speed 100 \\
         --target 10x7x15 --poses guided --out xarm6
 
-It needs handeye_driver.py and simulated_cell.py beside it. Run with PyBullet 3.2.7 and numpy 2.4 on Python 3.11.
+It needs handeye_driver.py and simulated_cell.py beside it. Run with PyBullet 3.2.7, and numpy 2.0 and 2.4, on Python 3.9 and
+3.11.
 """
 
 import math
