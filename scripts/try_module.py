@@ -44,9 +44,11 @@ def main():
         mode="eye_in_hand",
         intrinsics=handeye.Intrinsics.from_opencv(camera_matrix, np.zeros(5), (640, 480)),
     )
-    off_mm = 1e3 * np.linalg.norm(found.tip_from_camera[:3, 3] - tip_from_camera[:3, 3])
-    print(f"handeye {handeye.__version__}: {off_mm:.3f} mm off, {found.tip_error_95_mm:.3f} mm stated")
-    assert off_mm < 0.2, "more than 0.05 px of noise explain"
+    # What is stated is of points where the board was.
+    point = np.array([0, 0, 0.45, 1])
+    off_mm = 1e3 * np.linalg.norm((found.tip_from_camera - tip_from_camera) @ point)
+    print(f"handeye {handeye.__version__}: a point is {off_mm:.3f} mm off, {found.tip_error_95_mm:.3f} mm stated")
+    assert off_mm < 2 * found.tip_error_95_mm, "more than 0.05 px of noise explain"
 
 
 if __name__ == "__main__":

@@ -24,8 +24,8 @@ import numpy as np
 import pandas as pd
 import ray
 
-# Results and journals change when a session is opened; the hash is of what a calibration reads.
-READ = (".toml", ".csv", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".npy")
+# What the workbench writes beside the data. The hash is of what a calibration reads: tables, images, the URDF of an arm.
+WRITTEN = ("journal.jsonl", "session.json", "result.json", ".lock", ".rrd")
 
 
 def sessions_of(source):
@@ -38,7 +38,7 @@ def local_copy(files, folder, to):
     """The session as a local folder, and the hash of what is read of it."""
     digest = hashlib.sha256()
     for path in sorted(files.find(folder)):
-        if path.lower().endswith(READ):
+        if not path.endswith(WRITTEN):
             data = files.cat_file(path)
             name = os.path.relpath(path, folder)
             digest.update(f"{name}\0{len(data)}\0".encode() + data)

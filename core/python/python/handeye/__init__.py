@@ -2,8 +2,8 @@
 
 `calibrate` takes corners or pose pairs as numpy arrays, `calibrate_hand_eye` the arguments of OpenCV's calibrateHandEye,
 `calibrate_dataset` a folder; `doctor` says what is wrong with the data, `clock_offset` relates two clocks, `load_dataset` reads
-a dataset folder, `load_calibration` a result. Transforms are 4 × 4 arrays named `dst_from_src`, lengths metres, angles radians and pixels
-OpenCV's, unless a name says otherwise.
+a dataset folder, `load_calibration` a result. Transforms are 4 × 4 arrays named `dst_from_src`, lengths metres, angles radians
+and pixels OpenCV's, unless a name says otherwise.
 """
 
 from ._arm import Arm, ArmLevels, Command, JointErrors, TipPose
