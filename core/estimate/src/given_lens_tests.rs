@@ -1,4 +1,7 @@
+use nalgebra::{Isometry3, Translation3, Vector3};
+
 use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::frames::Pose;
 use handeye_geometry::observations::KnownLens;
 use handeye_geometry::progress::CancelToken;
 use handeye_simulate::session::{Setup, session};
@@ -89,6 +92,38 @@ fn a_lens_that_is_farther_off_than_is_said_of_it_is_named() {
         let (calibration, _) = solved(Mode::EyeInHand, 71, near);
         assert!(find(&calibration, FindingCode::WrongIntrinsics).is_some(), "{accuracy_px}");
     }
+}
+
+#[test]
+fn robot_poses_that_no_model_follows_do_not_pull_an_estimated_lens_beyond_its_stated_error() {
+    // Waves of 5 mm, and a place that errs with the square of its height by up to centimetres.
+    let wrong: [fn(&Isometry3<f64>) -> Vector3<f64>; 2] = [
+        |pose| pose.translation.vector.yxz().component_mul(&Vector3::new(10.0, 15.0, 12.0)).map(|x| 0.005 * x.sin()),
+        |pose| pose.rotation * Vector3::z() * (0.25 * pose.translation.z.powi(2)),
+    ];
+    let (mut outside, mut count) = (0, 0);
+    for (mode, seed) in [Mode::EyeInHand, Mode::EyeToHand].into_iter().flat_map(|m| (110..118).map(move |s| (m, s))) {
+        for off in wrong {
+            let mut truth = session(&Setup { noise: NOISE, ..Setup::new(mode, 20, seed) });
+            for view in &mut truth.views {
+                let pose = *view.base_from_tip.isometry();
+                let shifted = Translation3::from(pose.translation.vector + off(&pose));
+                view.base_from_tip = Pose::from_isometry(Isometry3::from_parts(shifted, pose.rotation));
+            }
+            let calibration =
+                calibrate(&truth.observations(true), Method::Joint, &CancelToken::default()).expect("solves");
+            let lens = calibration.camera.expect("estimated");
+            let parameters = lens.intrinsics.parameters().into_iter().zip(truth.intrinsics.parameters());
+            for ((found, is), sigma) in parameters.zip(lens.sigma_px.expect("stated")) {
+                outside += usize::from((found - is).abs() > 1.96 * sigma);
+                count += 1;
+            }
+        }
+    }
+    println!("{outside} of {count}");
+    // 15 or more of 128 independent ones come about by chance twice in a thousand.
+    assert_eq!(count, 128);
+    assert!(outside < 15, "{outside} of {count}");
 }
 
 #[test]
