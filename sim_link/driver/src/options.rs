@@ -16,7 +16,7 @@ pub struct DriverOptions {
     pub preparation: Duration,
     /// How often a ping is sent.
     pub ping_every: Duration,
-    /// A driver without a pong for this long is gone.
+    /// A driver without a pong for this long is gone: longer than one that renders its own images is kept waiting on a busy machine.
     pub silence: Duration,
     /// Longest wait for the answer to a short request, and for an arm that brakes.
     pub answer: Duration,
@@ -53,7 +53,7 @@ impl Default for DriverOptions {
             hello: Duration::from_secs(10),
             preparation: Duration::from_mins(10),
             ping_every: Duration::from_millis(200),
-            silence: Duration::from_secs(2),
+            silence: Duration::from_secs(5),
             answer: Duration::from_secs(2),
             motion: Duration::from_mins(5),
             farewell: Duration::from_secs(1),

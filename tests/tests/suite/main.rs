@@ -45,6 +45,7 @@ mod slow {
     mod robots;
     mod sample;
     mod served;
+    mod simulators;
     mod stops;
     mod tracking;
     mod verifying;
