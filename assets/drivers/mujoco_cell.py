@@ -1,27 +1,27 @@
 # /// script
 # requires-python = ">=3.9"
-# dependencies = ["mujoco>=3.2.7,<5", "numpy"]
+# dependencies = ["mujoco>=3.2.7,<5", "numpy<3"]
 # ///
 """A driver of Handeye Workbench with a cell simulated by MuJoCo: an arm, a camera and a chessboard.
 
-To install: python3 -m pip install mujoco. On Linux images are rendered without a display by EGL or OSMesa, in software where there
-is no graphics card: on Debian and Ubuntu apt install libegl1 libgl1-mesa-dri, or libosmesa6. MUJOCO_GL=egl, osmesa or glfw chooses
-among them. Its own arm has the dimensions of a Universal Robots UR5e; --model and --tip name another one, such as those of MuJoCo
-Menagerie, to which camera and board are added. The workbench calibrates the camera on the arm, or with --eye-to-hand one beside it:
+On Linux images are rendered without a display by EGL or OSMesa, in software where there is no graphics card: on Debian and Ubuntu
+apt install libegl1 libgl1-mesa-dri, or libosmesa6. MUJOCO_GL=egl, osmesa or glfw chooses among them. Its own arm has the dimensions
+of a Universal Robots UR5e; --model and --tip name another one, such as those of MuJoCo Menagerie, to which camera and board are
+added. The workbench calibrates the camera on the arm, or with --eye-to-hand one beside it:
 
-    handeye driver test "python3 mujoco_cell.py" --allow-motion
+    handeye driver test "handeye driver mujoco" --allow-motion
 
-    handeye auto --driver "python3 mujoco_cell.py --truth truth.json" --allow-motion --speed 100 \\
+    handeye auto --driver "handeye driver mujoco --truth truth.json" --allow-motion --speed 100 \\
         --target 10x7x15 --poses guided --out ur5e
 
-    handeye auto --driver "python3 mujoco_cell.py --eye-to-hand" --mode eye_to_hand --allow-motion --speed 100 \\
+    handeye auto --driver "handeye driver mujoco --eye-to-hand" --mode eye_to_hand --allow-motion --speed 100 \\
         --target 10x7x15 --poses guided --out beside
 
-    handeye auto --driver "python3 mujoco_cell.py --model scene.xml --tip attachment_site" --allow-motion --speed 100 \\
+    handeye auto --driver "handeye driver mujoco --model scene.xml --tip attachment_site" --allow-motion --speed 100 \\
         --target 10x7x15 --poses guided --out other
 
-It needs handeye_driver.py and simulated_cell.py beside it. Run with MuJoCo 3.2.7, 3.3.7 and 4.0.0 by EGL in software, on Python
-3.9 and 3.11; OSMesa gave the same image as EGL.
+Run with MuJoCo 3.2.7, 3.3.7 and 4.0.0 by EGL in software, on Python 3.9
+and 3.11; OSMesa gave the same image as EGL.
 """
 
 import ctypes.util

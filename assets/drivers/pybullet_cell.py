@@ -1,23 +1,22 @@
 # /// script
 # requires-python = ">=3.9"
-# dependencies = ["pybullet>=3.2,<4", "numpy"]
+# dependencies = ["pybullet>=3.2,<4", "numpy<3"]
 # ///
 """A driver of Handeye Workbench with a cell simulated by PyBullet: an arm, a camera and a chessboard.
 
-To install: python3 -m pip install pybullet numpy. Nothing else is needed, no display and no graphics card: images are rendered
-by PyBullet's own TinyRenderer. Its arms are a Franka Panda, a KUKA iiwa and a UFACTORY xArm 6, and with --urdf and --tip any other
-that PyBullet loads. The workbench calibrates the camera on the arm, or with --eye-to-hand one beside it:
+No display and no graphics card are needed: images are rendered by PyBullet's own TinyRenderer. Its arms are a Franka Panda, a KUKA
+iiwa and a UFACTORY xArm 6, and with --urdf and --tip any other that PyBullet loads. The workbench calibrates the camera on the arm,
+or with --eye-to-hand one beside it:
 
-    handeye driver test "python3 pybullet_cell.py --arm panda" --allow-motion
+    handeye driver test "handeye driver pybullet --arm panda" --allow-motion
 
-    handeye auto --driver "python3 pybullet_cell.py --arm panda --truth truth.json" --allow-motion --speed 100 \\
+    handeye auto --driver "handeye driver pybullet --arm panda --truth truth.json" --allow-motion --speed 100 \\
         --target 10x7x15 --poses guided --out panda
 
-    handeye auto --driver "python3 pybullet_cell.py --arm xarm6 --eye-to-hand" --mode eye_to_hand --allow-motion --speed 100 \\
+    handeye auto --driver "handeye driver pybullet --arm xarm6 --eye-to-hand" --mode eye_to_hand --allow-motion --speed 100 \\
         --target 10x7x15 --poses guided --out xarm6
 
-It needs handeye_driver.py and simulated_cell.py beside it. Run with PyBullet 3.2.7, and numpy 2.0 and 2.4, on Python 3.9 and
-3.11.
+Run with PyBullet 3.2.7, and numpy 2.0 and 2.4, on Python 3.9 and 3.11.
 """
 
 import math

@@ -50,6 +50,8 @@ RESET_S = 1.0
 STALE_S = 2.0
 # Image and depth image of one exposure have stamps no further apart [s].
 ONE_INSTANT_S = 0.005
+# A joint slower than this is at rest [rad/s, or m/s].
+REST_SPEED = 1e-2
 # How far the norm of a quaternion of tf may be from 1: rounding to three digits is within, zeros of a field never set are not.
 UNIT_TOLERANCE = 1e-3
 # Bounds on untrusted input: frames, links of a chain, values of a stream, pieces of messages, sides of an image.
@@ -222,6 +224,7 @@ class Joints:
 
     def __init__(self, names):
         self.names, self.samples, self.seen = names, Samples(), []
+        self.moving = None  # where the newest message has speeds
 
     def take(self, message):
         """Takes a message. One that lacks a joint says nothing: another publisher has it."""
@@ -230,6 +233,16 @@ class Joints:
         found = [values.get(name) for name in self.names]
         if found and None not in found:
             self.samples.push(seconds(message), tuple(map(float, found)))
+            self.moving = moves(self.names, message)
+
+
+def moves(names, message):
+    """Whether one of these joints moves; None if the message lacks a speed: none at all, null, or the NaN of ros2_control."""
+    speeds = dict(zip(message["name"], message.get("velocity", ())))
+    speeds = [speeds.get(name) for name in names]
+    if None in speeds or any(math.isnan(speed) for speed in speeds):
+        return None
+    return any(abs(speed) > REST_SPEED for speed in speeds)
 
 
 def joints_of_urdf(path, base, tip):
@@ -384,8 +397,11 @@ class Bridge:
     """The connection to rosbridge. What comes over it waits in `incoming`: pairs of a topic and a message, of "status" and its
     text, of "topics" and their list, or of "close" and why. A reader that is slow slows down rosbridge."""
 
+    speaker = "rosbridge"
+
     def __init__(self, url, fragment_size):
         self.url, self.fragment_size = url, fragment_size
+        self.name = f"ROS through rosbridge at {url}"
         self.incoming = queue.Queue(maxsize=200)
         self.subscribed = set()
         self.pieces = collections.OrderedDict()
@@ -480,9 +496,10 @@ def address(url):
 
 
 class Rosbridge:
-    def __init__(self, options, arm_joints):
-        self.options, self.arm_joints = options, arm_joints
-        self.bridge = Bridge(options.url, options.fragment_size)
+    """The driver. The bridge is what the messages of ROS come over."""
+
+    def __init__(self, options, arm_joints, bridge):
+        self.options, self.arm_joints, self.bridge = options, arm_joints, bridge
         self.tree = Tree()
         self.joints = Joints([joint["name"] for joint in arm_joints])
         self.frames = (options.base_frame, options.tip_frame) if options.base_frame else None
@@ -552,7 +569,7 @@ class Rosbridge:
         lines = [f"after {FIRST_S:.0f} s: {self.missing()}"]
         readable = [f"  {topic} ({kind})" for topic, kind in self.topics if kind.endswith(READ)][:50]
         lines += ["Topics that can be read:", *readable] if readable else []
-        return "\n".join(lines + [f"rosbridge says: {complaint}" for complaint in self.complaints])
+        return "\n".join(lines + [f"{self.bridge.speaker} says: {complaint}" for complaint in self.complaints])
 
     def list_frames(self):
         frames = self.tree.describe()
@@ -565,7 +582,7 @@ class Rosbridge:
 
     def hello(self):
         options = self.options
-        hello = {"name": f"ROS through rosbridge at {options.url}", "clock": "ROS"}
+        hello = {"name": self.bridge.name, "clock": "ROS"}
         abilities = {"state": self.frames, "joints": options.joints, "image": options.image, "depth": options.depth}
         hello["can"] = [ability for ability, topic in abilities.items() if topic]
         if options.joints:
@@ -600,7 +617,7 @@ class Rosbridge:
             text = str(message.get("msg"))
             if len(self.complaints) < 10 and text not in self.complaints:
                 self.complaints.append(text)
-            outlet.log("error" if message.get("level") == "error" else "info", f"rosbridge says: {text}")
+            outlet.log("error" if message.get("level") == "error" else "info", f"{self.bridge.speaker} says: {text}")
         else:
             self.heard.add(topic)
             self.of_topic(topic, lambda: self.take(topic, message, outlet))
@@ -724,7 +741,7 @@ class Rosbridge:
         joints = self.joints.samples.at(stamp, line) if self.options.joints else None
         if self.options.joints and joints is None:
             return
-        outlet.state(stamp, joints_rad=joints, base_from_tip=pose(translation, rotation))
+        outlet.state(stamp, joints_rad=joints, base_from_tip=pose(translation, rotation), moving=self.joints.moving)
         self.last_s, self.sent_s, self.is_stale = stamp, now, False
 
 
@@ -748,6 +765,16 @@ def main():
         type=within(1000, MOST_BYTES, int),
         help="have rosbridge cut longer messages into pieces, where a proxy between does not let them through",
     )
+    chosen, joints = chosen_by(options)
+    try:
+        address(chosen.url)
+    except Fault as fault:
+        options.error(str(fault))
+    serve(Rosbridge(chosen, joints, Bridge(chosen.url, chosen.fragment_size)))
+
+
+def chosen_by(options):
+    """The options that were given, where they belong together, and the arm's joints."""
     chosen = options.parse_args()
     for option, needs in (
         ("base_frame", "tip_frame"), ("tip_frame", "base_frame"), ("camera_info", "image"), ("depth", "image"),
@@ -766,10 +793,9 @@ def main():
         joints = [{"name": name, "kind": "revolute"} for name in (chosen.joint_names or "").split(",") if name]
         if chosen.urdf:
             joints = joints_of_urdf(chosen.urdf, chosen.base_frame, chosen.tip_frame)
-        address(chosen.url)
     except Fault as fault:
         options.error(str(fault))
-    serve(Rosbridge(chosen, joints))
+    return chosen, joints
 
 
 if __name__ == "__main__":

@@ -123,28 +123,3 @@ for line in sys.stdin.buffer:  # ends when the workbench closes it
 with lock:
     halt("the workbench is gone")
     os._exit(0)
-
-# A camera of Intel by pyrealsense2. Untested: a sketch of what goes into `read_camera`, and "depth" into `can`.
-#   import pyrealsense2 as rs
-#   pipeline, align = rs.pipeline(), rs.align(rs.stream.color)
-#   config = rs.config()
-#   config.enable_stream(rs.stream.color, 640, 480, rs.format.rgb8, 30)
-#   config.enable_stream(rs.stream.depth, 640, 480, rs.format.z16, 30)
-#   unit_mm = 1000 * pipeline.start(config).get_device().first_depth_sensor().get_depth_scale()
-#   frames = align.process(pipeline.wait_for_frames(1000))
-#   stamp = time.monotonic() - (time.time() - frames.get_timestamp() / 1000)   # global time of the camera, in ms of the host
-#   data = bytes(frames.get_color_frame().get_data())          # "rgb8"
-#   depth = bytes(frames.get_depth_frame().get_data())         # "u16_mm" where unit_mm is 1
-#
-# A robot of ROS 2 by rclpy. Untested: a sketch of what goes into `read_robot`. Poses come from tf, joints from a topic.
-#   import rclpy, tf2_ros
-#   from sensor_msgs.msg import JointState
-#   rclpy.init(); node = rclpy.create_node("handeye_driver"); buffer = tf2_ros.Buffer()
-#   listener = tf2_ros.TransformListener(buffer, node); newest = {}
-#   node.create_subscription(JointState, "joint_states", lambda m: newest.update(m=m, q=dict(zip(m.name, m.position))), 1)
-#   threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()
-#   t = buffer.lookup_transform("base_link", "tool0", rclpy.time.Time())       # base_from_tip; its newest stamp is
-#   stamp = t.header.stamp.sec + 1e-9 * t.header.stamp.nanosec                 # on ROS's clock: then a pong is stamped by
-#   p, q = t.transform.translation, t.transform.rotation                       # node.get_clock().now().nanoseconds * 1e-9
-#   pose = {"translation_m": [p.x, p.y, p.z], "rotation_xyzw": [q.x, q.y, q.z, q.w]}
-#   joints = [newest["q"][name] for name in ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint")]

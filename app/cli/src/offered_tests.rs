@@ -29,9 +29,13 @@ fn of_clap(command: &Command) -> Vec<Option> {
 /// The options of a driver in Python, as its file adds them to a parser, with the one that all have.
 fn of_python(source: &str) -> Vec<Option> {
     let added = source.split("add").filter_map(|call| {
-        let call = call.strip_prefix("_argument").unwrap_or(call).strip_prefix('(')?;
-        let (name, rest) = call.trim_start().strip_prefix('"')?.split_once('"')?;
+        let (is_argument, call) = call.strip_prefix("_argument").map_or((false, call), |call| (true, call));
+        let (name, rest) = call.strip_prefix('(')?.trim_start().strip_prefix('"')?.split_once('"')?;
         let is_option = name.starts_with("--");
+        // Under a shorter name it may be another function that adds something.
+        if !is_option && !is_argument {
+            return None;
+        }
         Some((if is_option { name.to_owned() } else { String::new() }, !is_option || rest.contains("required=True")))
     });
     added.chain([("--python".to_owned(), false)]).collect()
@@ -47,7 +51,12 @@ fn every_driver_that_comes_with_the_program_is_offered_with_every_option_it_has(
         let name = command.get_name();
         let offered = ALL.iter().find(|offered| offered.name == name).unwrap_or_else(|| panic!("{name}: not offered"));
         let file = python::ALL.iter().find(|shipped| shipped.name == name);
-        let options = file.map_or_else(|| of_clap(command), |file| of_python(file.source));
+        // Cells of other simulators add their common options in a file that they share.
+        let of_file = |file: &python::Shipped| {
+            let shared = file.files().filter(|(name, _)| *name == "simulated_cell.py").map(|(_, source)| source);
+            of_python(&std::iter::once(file.source).chain(shared).collect::<String>())
+        };
+        let options = file.map_or_else(|| of_clap(command), of_file);
         for (option, is_needed) in &options {
             let field = offered.fields.iter().find(|field| field.option == option);
             let is_always = offered.camera_alone.contains(&option.as_str());

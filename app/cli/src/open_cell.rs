@@ -24,6 +24,7 @@ use handeye_workbench::worker::FollowLine;
 
 use crate::Failure;
 use crate::cell_choice::CellChoice;
+use crate::driver::python;
 
 /// How long a robot behind a driver may take to report its pose, and to be identified by its joints.
 const FIRST_STATE: Duration = Duration::from_secs(5);
@@ -60,7 +61,15 @@ impl OpenCell {
     pub fn connect(choice: &CellChoice, own: CellConfig, cancel: &CancelToken) -> Result<Self, Failure> {
         let paths = choice.paths(&own.scene.robot.name);
         let cell: Arc<dyn Cell> = match choice.source()? {
-            Some(source @ (CellSource::Address(_) | CellSource::Drivers(_))) => source.cell(&paths),
+            Some(source @ (CellSource::Address(_) | CellSource::Drivers(_))) => {
+                if let CellSource::Drivers(drivers) = &source {
+                    // Here, where its progress is visible and nothing waits for an answer.
+                    for command in [&drivers.robot, &drivers.camera].into_iter().flatten() {
+                        python::prepare(command)?;
+                    }
+                }
+                source.cell(&paths)
+            }
             Some(CellSource::BuiltIn(_)) | None => {
                 Arc::new(RemoteCell::own(CellServer::start(own).map_err(Failure::failed)?, paths))
             }

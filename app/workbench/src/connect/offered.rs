@@ -84,6 +84,14 @@ use Rank::{More, Needed, Usual};
 /// For every driver that is a Python file: which Python to use, if it should not have an environment of its own.
 const PYTHON: Field = field("--python", Text("/usr/bin/python3"), More);
 
+/// What the cells of other simulators have in common.
+const SIDE: Field = robot_field("--eye-to-hand", Switch, Usual);
+const CELL_BOARD: Field = robot_field("--board", Text("10x7x15"), More);
+const CELL_SIZE: Field = robot_field("--size", Text("640x480"), More);
+const CELL_SAMPLES: Field = robot_field("--samples", Text("16"), More);
+const CELL_START: Field = robot_field("--start", Text("0,-80,-110,-80,90,0"), More);
+const CELL_TRUTH: Field = robot_field("--truth", Text("truth.json"), More);
+
 /// All of them, in the order of the list.
 pub static ALL: &[Offered] = &[
     Offered {
@@ -94,6 +102,29 @@ pub static ALL: &[Offered] = &[
             robot_field("--host", Text("192.168.0.10"), Needed),
             robot_field("--arm", Word(|| ArmKind::ALL.into_iter().map(ArmKind::name).collect()), Usual),
             robot_field("--frequency", Text("125"), More),
+            PYTHON,
+        ],
+    },
+    Offered {
+        name: "xarm",
+        parts: &[Part::Robot],
+        camera_alone: &[],
+        fields: &[
+            robot_field("--host", Text("192.168.1.185"), Needed),
+            robot_field("--urdf", Text("robot.urdf"), Usual),
+            robot_field("--tip-link", Text("link_eef"), More),
+            PYTHON,
+        ],
+    },
+    Offered {
+        name: "franka",
+        parts: &[Part::Robot],
+        camera_alone: &[],
+        fields: &[
+            robot_field("--host", Text("172.16.0.2"), Needed),
+            robot_field("--urdf", Text("robot.urdf"), Usual),
+            robot_field("--tip-link", Text("fr3_link8"), More),
+            robot_field("--frequency", Text("100"), More),
             PYTHON,
         ],
     },
@@ -117,6 +148,24 @@ pub static ALL: &[Offered] = &[
             PYTHON,
         ],
     },
+    Offered {
+        name: "ros2",
+        parts: &[Part::Robot, Part::Camera],
+        camera_alone: &[],
+        fields: &[
+            robot_field("--base-frame", Text("base_link"), Usual),
+            robot_field("--tip-frame", Text("tool0"), Usual),
+            field("--image", Text("/camera/image_raw"), Usual),
+            field("--camera-info", Text("/camera/camera_info"), Usual),
+            field("--rectified", Switch, More),
+            field("--depth", Text("/camera/depth"), More),
+            robot_field("--joints", Text("/joint_states"), More),
+            robot_field("--joint-names", Text("joint_1,joint_2,…"), More),
+            robot_field("--urdf", Text("robot.urdf"), More),
+            field("--image-rate", Text("10"), More),
+            PYTHON,
+        ],
+    },
     #[cfg(target_os = "linux")]
     Offered {
         name: "v4l",
@@ -127,6 +176,35 @@ pub static ALL: &[Offered] = &[
             field("--size", Text("1280x720"), Usual),
             field("--format", Word(|| vec!["RGB3", "YUYV", "GREY", "MJPG"]), More),
             field("--rate", Text("30"), More),
+            PYTHON,
+        ],
+    },
+    Offered {
+        name: "realsense",
+        parts: &[Part::Camera],
+        camera_alone: &[],
+        fields: &[
+            field("--serial", Text("123456789012"), Usual),
+            field("--size", Text("1280x720"), Usual),
+            field("--exposure", Text("100"), Usual),
+            field("--gain", Text("16"), More),
+            field("--rate", Text("30"), More),
+            field("--no-depth", Switch, More),
+            PYTHON,
+        ],
+    },
+    Offered {
+        name: "orbbec",
+        parts: &[Part::Camera],
+        camera_alone: &[],
+        fields: &[
+            field("--serial", Text("CP1234567890"), Usual),
+            field("--size", Text("1280x720"), Usual),
+            field("--exposure", Text("100"), Usual),
+            field("--gain", Text("16"), More),
+            field("--format", Word(|| vec!["YUYV", "MJPG", "RGB"]), More),
+            field("--rate", Text("30"), More),
+            field("--no-depth", Switch, More),
             PYTHON,
         ],
     },
@@ -149,6 +227,40 @@ pub static ALL: &[Offered] = &[
             robot_field("--joint-unit", Word(|| vec!["rad", "deg"]), More),
             field("--size", Text("1280x720"), More),
             field("--hold", Text("2"), More),
+            PYTHON,
+        ],
+    },
+    Offered {
+        name: "mujoco",
+        parts: &[Part::Robot],
+        camera_alone: &[],
+        fields: &[
+            SIDE,
+            robot_field("--model", Text("scene.xml"), Usual),
+            robot_field("--tip", Text("attachment_site"), Usual),
+            robot_field("--camera", Text("wrist"), More),
+            CELL_BOARD,
+            CELL_SIZE,
+            CELL_SAMPLES,
+            CELL_START,
+            CELL_TRUTH,
+            PYTHON,
+        ],
+    },
+    Offered {
+        name: "pybullet",
+        parts: &[Part::Robot],
+        camera_alone: &[],
+        fields: &[
+            robot_field("--arm", Word(|| vec!["panda", "iiwa", "xarm6"]), Usual),
+            SIDE,
+            robot_field("--urdf", Text("robot.urdf"), More),
+            robot_field("--tip", Text("tool0"), More),
+            CELL_BOARD,
+            CELL_SIZE,
+            CELL_SAMPLES,
+            CELL_START,
+            CELL_TRUTH,
             PYTHON,
         ],
     },
@@ -249,8 +361,15 @@ impl Offered {
         match self.name {
             "ur-rtde" => tr!(language, "Universal Robots (RTDE)"),
             "rosbridge" => tr!(language, "ROS 1 or ROS 2 (rosbridge)"),
+            "xarm" => tr!(language, "UFACTORY xArm"),
+            "franka" => tr!(language, "Franka arm"),
+            "ros2" => tr!(language, "ROS 2 (rclpy)"),
             "v4l" => tr!(language, "USB camera (Video4Linux)"),
+            "realsense" => tr!(language, "Intel RealSense"),
+            "orbbec" => tr!(language, "Orbbec"),
             "folder" => tr!(language, "Folder that images are saved in"),
+            "mujoco" => tr!(language, "Cell simulated by MuJoCo"),
+            "pybullet" => tr!(language, "Cell simulated by PyBullet"),
             _ => tr!(language, "Simulated robot and camera"),
         }
     }
@@ -267,13 +386,34 @@ impl Offered {
                 language,
                 "Reads robot and camera; it does not move the arm. Without frames and images it lists the frames of tf in Log."
             ),
-            ("rosbridge", Part::Camera) => tr!(language, "Reads the images of one topic."),
+            ("xarm" | "franka", _) => tr!(
+                language,
+                "Reads the controller; it does not move the arm. With a URDF the arm is drawn and its errors are estimated."
+            ),
+            ("ros2", Part::Robot) => tr!(
+                language,
+                "Reads robot and camera; it does not move the arm. Start the workbench where ROS is set up. \
+                 Without frames and images it lists the frames of tf in Log."
+            ),
+            ("rosbridge" | "ros2", Part::Camera) => tr!(language, "Reads the images of one topic."),
+            ("realsense" | "orbbec", _) => {
+                tr!(language, "Reads colour images, depth and the lens that the camera states.")
+            }
             ("v4l", _) => tr!(language, "Switch autofocus off before the first capture."),
             ("folder", Part::Robot) => tr!(
                 language,
                 "Shows each new image with its pose. How poses are written is said here or in the folder's dataset.toml."
             ),
             ("folder", Part::Camera) => tr!(language, "Shows each new image."),
+            ("mujoco", _) => tr!(
+                language,
+                "Nothing real is connected. An arm with the dimensions of a UR5e, or a model (MJCF) with its tip. The simulator is \
+                 installed the first time."
+            ),
+            ("pybullet", _) => tr!(
+                language,
+                "Nothing real is connected. An arm of the list, or a URDF with its tip. The simulator is installed the first time."
+            ),
             _ => tr!(language, "To try the window with a driver: nothing real is connected."),
         }
     }
@@ -296,10 +436,15 @@ impl Field {
             "--joints" => tr!(language, "Joint state topic"),
             "--joint-names" => tr!(language, "Joint names"),
             "--urdf" => tr!(language, "URDF file"),
+            "--tip-link" => tr!(language, "Flange in the URDF"),
             "--image-rate" | "--rate" => tr!(language, "Images per second"),
             "--fragment-size" => tr!(language, "Fragments [bytes]"),
             "--device" => tr!(language, "Device"),
             "--size" => tr!(language, "Image size [px]"),
+            "--serial" => tr!(language, "Serial number"),
+            "--exposure" => tr!(language, "Exposure [camera units]"),
+            "--gain" => tr!(language, "Gain [camera units]"),
+            "--no-depth" => tr!(language, "Without depth"),
             "--format" => tr!(language, "Pixel format"),
             "" => tr!(language, "Folder"),
             "--length-unit" => tr!(language, "Length unit"),
@@ -313,6 +458,14 @@ impl Field {
             "--scene" => tr!(language, "Scene"),
             "--seed" => tr!(language, "Seed"),
             "--arm-errors" => tr!(language, "Errors of the links"),
+            "--eye-to-hand" => tr!(language, "Camera beside the arm"),
+            "--model" => tr!(language, "Model (MJCF)"),
+            "--tip" => tr!(language, "Tip"),
+            "--camera" => tr!(language, "Camera of the model"),
+            "--board" => tr!(language, "Board"),
+            "--samples" => tr!(language, "Renderings per image"),
+            "--start" => tr!(language, "Joints at the start [°, mm]"),
+            "--truth" => tr!(language, "File for the truth"),
             "--connect" => tr!(language, "Running cell"),
             "--only" => tr!(language, "One part alone"),
             _ => tr!(language, "Clock begins at [s]"),

@@ -76,6 +76,21 @@ fn the_environment_of_a_driver_is_made_once_and_says_so() {
     assert_eq!(other.installed(), 0);
 }
 
+/// Seen with a simulator: the command ended with "is being prepared", and only its second start found the environment.
+#[test]
+fn a_command_waits_for_the_environment_of_its_driver() {
+    let Some(python) = python() else { return };
+    let installer = Installer::new(&python, "", "echo Collecting pillow; sleep 3");
+    let images = tempfile::tempdir().expect("a folder");
+    RgbImage::new(8, 6).save(images.path().join("a.png")).expect("an image");
+    let driver = format!("handeye driver folder '{}' --images-only", images.path().display());
+    let output =
+        installer.handeye(&["auto", "--driver", &driver, "--target", "9x6x25"]).output().expect("handeye runs");
+    let errors = text(&output.stderr);
+    assert!(installer.installed() == 1 && errors.contains("Collecting pillow"), "{errors}");
+    assert!(!errors.contains("is being prepared"), "{errors}");
+}
+
 #[test]
 fn a_workbench_hears_that_an_environment_is_being_made_before_the_driver_answers() {
     let Some(python) = python() else { return };

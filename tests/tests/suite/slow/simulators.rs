@@ -8,16 +8,17 @@ use handeye_tests::{handeye_binary, workspace_root};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 use serde_json::Value;
 
-/// A calibration from the board in view on; the camera must be where the simulator has it, within what is stated and within 0.3 mm.
-fn calibrate(module: &str, driver: &str, mode: &str) {
-    let Some(python) = python() else { return };
+/// A calibration from the board in view on: by how much a point where the board was seen is off, by the camera's true place, and what is
+/// stated of that, 95 %, millimetres.
+fn calibrated(module: &str, driver: &str, mode: &str) -> Option<[f64; 2]> {
+    let python = python()?;
     let there = Command::new(&python).args(["-c", &format!("import {module}")]).output().expect("Python runs");
     if !there.status.success() {
         skip(
             Need::Python,
             &format!("this Python has no module {module}: tests/python/requirements.txt names one that has it"),
         );
-        return;
+        return None;
     }
     let home = tempfile::tempdir().expect("a folder");
     let truth = home.path().join("truth.json");
@@ -50,29 +51,38 @@ fn calibrate(module: &str, driver: &str, mode: &str) {
     let off_mm = (found.isometry() * seen - truth * seen).norm() * 1e3;
     let stated_mm = result.quality.tip_error_95_mm.expect("stated");
     println!("{driver} {mode}: {} views, off by {off_mm:.4} mm, stated {stated_mm:.4} mm", result.views.len());
-    assert!(off_mm <= stated_mm, "{off_mm} mm, stated {stated_mm} mm");
     assert!(stated_mm <= 0.3, "{stated_mm} mm");
+    Some([off_mm, stated_mm])
+}
+
+fn assert_within([off_mm, stated_mm]: [f64; 2]) {
+    assert!(off_mm <= stated_mm, "{off_mm} mm, stated {stated_mm} mm");
 }
 
 #[test]
 fn a_camera_on_an_arm_in_mujoco_is_found() {
-    calibrate("mujoco", "mujoco_cell.py", "eye_in_hand");
+    if let Some(error) = calibrated("mujoco", "mujoco_cell.py", "eye_in_hand") {
+        assert_within(error);
+    }
 }
 
 #[test]
 fn a_camera_on_an_arm_in_pybullet_is_found() {
-    calibrate("pybullet", "pybullet_cell.py --arm panda", "eye_in_hand");
+    if let Some(error) = calibrated("pybullet", "pybullet_cell.py --arm panda", "eye_in_hand") {
+        assert_within(error);
+    }
 }
 
-/// The others, with a camera beside the arm: cargo test -p handeye_tests --release -- --ignored simulators
+/// Cameras beside the arms, and the other arms: cargo test -p handeye_tests -- --ignored simulators
 #[test]
 #[ignore = "some minutes, of the same drivers as the two above"]
 fn cameras_beside_arms_and_the_other_arms_of_simulators_are_found() {
-    calibrate("mujoco", "mujoco_cell.py --eye-to-hand", "eye_to_hand");
-    for arm in ["panda", "iiwa", "xarm6"] {
-        calibrate("pybullet", &format!("pybullet_cell.py --arm {arm} --eye-to-hand"), "eye_to_hand");
-    }
-    for arm in ["iiwa", "xarm6"] {
-        calibrate("pybullet", &format!("pybullet_cell.py --arm {arm}"), "eye_in_hand");
-    }
+    let beside = |arm: &str| format!("pybullet_cell.py --arm {arm} --eye-to-hand");
+    let on = |arm: &str| format!("pybullet_cell.py --arm {arm}");
+    let mut all = vec![calibrated("mujoco", "mujoco_cell.py --eye-to-hand", "eye_to_hand")];
+    all.extend(["panda", "iiwa", "xarm6"].map(|arm| calibrated("pybullet", &beside(arm), "eye_to_hand")));
+    all.extend(["iiwa", "xarm6"].map(|arm| calibrated("pybullet", &on(arm), "eye_in_hand")));
+    let outside = all.iter().flatten().filter(|[off_mm, stated_mm]| off_mm > stated_mm).count();
+    // Two or more of six are beyond a right 95 % once in thirty.
+    assert!(outside < 2, "{all:?}");
 }

@@ -6,7 +6,7 @@ use anyhow::anyhow;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 
-use super::files::{ALL, SHARED};
+use super::files::ALL;
 use super::script::Needs;
 use crate::{Failure, out};
 use handeye_workbench::arguments::heading;
@@ -27,7 +27,7 @@ pub struct EjectArgs {
 /// Writes the driver and what it shares with others.
 pub fn eject(args: &EjectArgs) -> Result<(), Failure> {
     let Some(driver) = ALL.iter().find(|driver| driver.name == args.driver) else { return Ok(()) };
-    let files = [(driver.file, driver.source), SHARED].map(|(file, source)| (args.out.join(file), source));
+    let files: Vec<_> = driver.files().map(|(file, source)| (args.out.join(file), source)).collect();
     // The shared one often exists already for another driver.
     let is_in_the_way =
         |path: &PathBuf, source: &str| std::fs::read(path).is_ok_and(|bytes| bytes != source.as_bytes());

@@ -92,7 +92,7 @@ pub enum Audience {
     Workbench,
 }
 
-/// The Python of a driver's environment, which is created if it does not exist yet.
+/// The Python of a driver's environment, which is created if it does not exist yet; that of the shell for a driver without packages.
 pub fn python_of(driver: &Shipped, audience: Audience) -> Result<Command, EnvironmentError> {
     // A test checks that every driver states its needs.
     let needs =
@@ -101,6 +101,10 @@ pub fn python_of(driver: &Shipped, audience: Audience) -> Result<Command, Enviro
     if !needs.has_python(base.version) {
         let (major, minor) = base.version;
         return Err(EnvironmentError::Old { found: format!("{major}.{minor}"), needed: needs.requires_python });
+    }
+    if needs.dependencies.is_empty() {
+        // What it imports comes with something else, such as ROS, for this Python and by the shell's PYTHONPATH.
+        return Ok(Command::new(PYTHON));
     }
     let cache = files::cache()?;
     let folder = cache.join(format!("{}-{:016x}", driver.name, key(&needs, &base)));

@@ -17,16 +17,29 @@ pub struct Shipped {
     pub name: &'static str,
     pub file: &'static str,
     pub source: &'static str,
+    /// Files that it imports beside [`SHARED`].
+    imports: &'static [File],
+}
+
+/// Name and content of a Python file.
+pub type File = (&'static str, &'static str);
+
+impl Shipped {
+    /// All that it runs with: its own file first.
+    pub fn files(&self) -> impl Iterator<Item = File> {
+        [(self.file, self.source), SHARED].into_iter().chain(self.imports.iter().copied())
+    }
 }
 
 macro_rules! shipped {
-    ($($constant:ident, $name:literal, $file:literal;)*) => {
+    ($($constant:ident, $name:literal, $file:literal, $imports:expr;)*) => {
         $(
             /// One of [`ALL`].
             pub const $constant: Shipped = Shipped {
                 name: $name,
                 file: $file,
                 source: include_str!(concat!("../../../../../assets/drivers/", $file)),
+                imports: $imports,
             };
         )*
         /// All of them.
@@ -35,14 +48,24 @@ macro_rules! shipped {
 }
 
 shipped! {
-    UR_RTDE, "ur-rtde", "ur_rtde.py";
-    ROSBRIDGE, "rosbridge", "rosbridge.py";
-    FOLDER, "folder", "folder.py";
-    V4L, "v4l", "v4l.py";
+    UR_RTDE, "ur-rtde", "ur_rtde.py", &[];
+    XARM, "xarm", "xarm.py", &[];
+    FRANKA, "franka", "franka.py", &[];
+    ROSBRIDGE, "rosbridge", "rosbridge.py", &[];
+    ROS2, "ros2", "ros2.py", &[(ROSBRIDGE.file, ROSBRIDGE.source)];
+    FOLDER, "folder", "folder.py", &[];
+    V4L, "v4l", "v4l.py", &[];
+    REALSENSE, "realsense", "realsense.py", &[];
+    ORBBEC, "orbbec", "orbbec.py", &[];
+    MUJOCO, "mujoco", "mujoco_cell.py", &[SIMULATED_CELL];
+    PYBULLET, "pybullet", "pybullet_cell.py", &[SIMULATED_CELL];
 }
 
 /// Their shared part: its file name and content.
-pub const SHARED: (&str, &str) = ("handeye_driver.py", include_str!("../../../../../assets/drivers/handeye_driver.py"));
+pub const SHARED: File = ("handeye_driver.py", include_str!("../../../../../assets/drivers/handeye_driver.py"));
+
+/// What the cells of other simulators share.
+const SIMULATED_CELL: File = ("simulated_cell.py", include_str!("../../../../../assets/drivers/simulated_cell.py"));
 
 /// The folder of the program's cache for drivers.
 pub fn cache() -> Result<PathBuf, EnvironmentError> {
@@ -54,17 +77,16 @@ pub fn cache() -> Result<PathBuf, EnvironmentError> {
 /// change what another runs.
 pub fn written() -> Result<PathBuf, EnvironmentError> {
     let mut hasher = DefaultHasher::new();
-    for driver in ALL {
-        driver.source.hash(&mut hasher);
+    for (_, source) in ALL.iter().flat_map(Shipped::files) {
+        source.hash(&mut hasher);
     }
-    SHARED.1.hash(&mut hasher);
     let folder = cache()?.join(format!("files-{:016x}", hasher.finish()));
     let failed = |path: &Path, error: &std::io::Error| EnvironmentError::NotWritten {
         path: path.to_path_buf(),
         why: error.to_string(),
     };
     std::fs::create_dir_all(&folder).map_err(|error| failed(&folder, &error))?;
-    for (file, source) in ALL.iter().map(|driver| (driver.file, driver.source)).chain([SHARED]) {
+    for (file, source) in ALL.iter().flat_map(Shipped::files) {
         let path = folder.join(file);
         if std::fs::read(&path).is_ok_and(|bytes| bytes == source.as_bytes()) {
             continue;

@@ -14,6 +14,7 @@ use std::process::Command;
 use clap::Args;
 
 use crate::Failure;
+use handeye_driver::DriverSpec;
 use handeye_workbench::arguments::heading;
 
 use environment::Audience;
@@ -21,7 +22,7 @@ use environment::Audience;
 pub use eject::{EjectArgs, eject};
 #[cfg(test)]
 pub use files::ALL;
-pub use files::{FOLDER, ROSBRIDGE, Shipped, UR_RTDE, V4L};
+pub use files::{FOLDER, FRANKA, MUJOCO, ORBBEC, PYBULLET, REALSENSE, ROS2, ROSBRIDGE, Shipped, UR_RTDE, V4L, XARM};
 
 /// The variable with the name that a driver shows in its help.
 pub const NAME_VARIABLE: &str = "HANDEYE_DRIVER";
@@ -65,8 +66,9 @@ fn audience() -> Audience {
 }
 
 /// Creates the environment of one of these drivers, if a command line starts one that has none yet.
-pub fn prepare(words: &[String]) -> Result<(), Failure> {
-    let [_, command, name, options @ ..] = words else { return Ok(()) };
+pub fn prepare(command: &str) -> Result<(), Failure> {
+    let Ok(DriverSpec::Command(words)) = command.parse() else { return Ok(()) };
+    let [_, command, name, options @ ..] = words.as_slice() else { return Ok(()) };
     let Some(driver) = files::ALL.iter().find(|driver| command == "driver" && driver.name == name) else {
         return Ok(());
     };

@@ -10,6 +10,8 @@ use handeye_workbench::model::{CellSource, Drivers, Model};
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
+/// Height that the list of drivers may have, points: all of them are seen without scrolling.
+const LIST: f32 = 420.0;
 /// Width of the input fields \[points\].
 const FIELD: f32 = 300.0;
 
@@ -139,7 +141,7 @@ fn seat_ui(ui: &mut Ui, language: Language, [name, label]: [&str; 2], seat: &mut
     let list = none.into_iter().chain(offered::of_part(seat.part).map(Choice::Offered)).chain([Choice::Other]);
     let before = seat.choice;
     form::row_ui(ui, name, |ui| {
-        let combo = ComboBox::from_id_salt(label).width(FIELD.min(ui.available_width()));
+        let combo = ComboBox::from_id_salt(label).width(FIELD.min(ui.available_width())).height(LIST);
         let shown = combo.selected_text(title(seat.choice, language)).show_ui(ui, |ui| {
             for choice in list {
                 ui.selectable_value(&mut seat.choice, choice, title(choice, language));
