@@ -94,10 +94,13 @@ fn a_lens_that_is_farther_off_than_is_said_of_it_is_named() {
     }
 }
 
+/// By how much the place of the tip is off at a pose, metres.
+type ErrorOfRobot = fn(&Isometry3<f64>) -> Vector3<f64>;
+
 #[test]
 fn robot_poses_that_no_model_follows_do_not_pull_an_estimated_lens_beyond_its_stated_error() {
     // Waves of 5 mm, and a place that errs with the square of its height by up to centimetres.
-    let wrong: [fn(&Isometry3<f64>) -> Vector3<f64>; 2] = [
+    let wrong: [ErrorOfRobot; 2] = [
         |pose| pose.translation.vector.yxz().component_mul(&Vector3::new(10.0, 15.0, 12.0)).map(|x| 0.005 * x.sin()),
         |pose| pose.rotation * Vector3::z() * (0.25 * pose.translation.z.powi(2)),
     ];

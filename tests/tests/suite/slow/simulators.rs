@@ -35,7 +35,7 @@ fn calibrated(module: &str, driver: &str, mode: &str) -> Option<[f64; 2]> {
     let result = CalibrationResult::from_json(&String::from_utf8_lossy(&output.stdout)).expect("a result");
     let truth: Value = serde_json::from_str(&std::fs::read_to_string(&truth).expect("written")).expect("JSON");
     let numbers =
-        |value: &Value| -> Vec<f64> { value.as_array().expect("a list").iter().flat_map(Value::as_f64).collect() };
+        |value: &Value| -> Vec<f64> { value.as_array().expect("a list").iter().filter_map(Value::as_f64).collect() };
     let pose = |translation: &[f64], rotation: &[f64]| {
         let rotation = Quaternion::new(rotation[3], rotation[0], rotation[1], rotation[2]);
         Isometry3::from_parts(
