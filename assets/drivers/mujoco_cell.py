@@ -11,17 +11,17 @@ added. The workbench calibrates the camera on the arm, or with --eye-to-hand one
 
     handeye driver test "handeye driver mujoco" --allow-motion
 
-    handeye auto --driver "handeye driver mujoco --truth truth.json" --allow-motion --speed 100 \\
-        --target 10x7x15 --poses guided --out ur5e
+    handeye auto --driver "handeye driver mujoco --truth truth.json" \\
+        --allow-motion --speed 100 --target 10x7x15 --poses guided --out ur5e
 
-    handeye auto --driver "handeye driver mujoco --eye-to-hand" --mode eye_to_hand --allow-motion --speed 100 \\
-        --target 10x7x15 --poses guided --out beside
+    handeye auto --driver "handeye driver mujoco --eye-to-hand" \\
+        --mode eye_to_hand --allow-motion --speed 100 --target 10x7x15 \\
+        --poses guided --out beside
 
-    handeye auto --driver "handeye driver mujoco --model scene.xml --tip attachment_site" --allow-motion --speed 100 \\
-        --target 10x7x15 --poses guided --out other
+    handeye auto --driver "handeye driver mujoco --model scene.xml --tip site" \\
+        --allow-motion --speed 100 --target 10x7x15 --poses guided --out other
 
-Run with MuJoCo 3.2.7, 3.3.7 and 4.0.0 by EGL in software, on Python 3.9
-and 3.11; OSMesa gave the same image as EGL.
+Run with MuJoCo 3.2.7, 3.3.7 and 4.0.0 by EGL in software, on Python 3.9 and 3.11; OSMesa gave the same image as EGL.
 """
 
 import ctypes.util

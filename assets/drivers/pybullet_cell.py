@@ -8,13 +8,14 @@ No display and no graphics card are needed: images are rendered by PyBullet's ow
 iiwa and a UFACTORY xArm 6, and with --urdf and --tip any other that PyBullet loads. The workbench calibrates the camera on the arm,
 or with --eye-to-hand one beside it:
 
-    handeye driver test "handeye driver pybullet --arm panda" --allow-motion
+    handeye driver test "handeye driver pybullet" --allow-motion
 
-    handeye auto --driver "handeye driver pybullet --arm panda --truth truth.json" --allow-motion --speed 100 \\
-        --target 10x7x15 --poses guided --out panda
+    handeye auto --driver "handeye driver pybullet --truth truth.json" \\
+        --allow-motion --speed 100 --target 10x7x15 --poses guided --out panda
 
-    handeye auto --driver "handeye driver pybullet --arm xarm6 --eye-to-hand" --mode eye_to_hand --allow-motion --speed 100 \\
-        --target 10x7x15 --poses guided --out xarm6
+    handeye auto --driver "handeye driver pybullet --arm xarm6 --eye-to-hand" \\
+        --mode eye_to_hand --allow-motion --speed 100 --target 10x7x15 \\
+        --poses guided --out xarm6
 
 Run with PyBullet 3.2.7, and numpy 2.0 and 2.4, on Python 3.9 and 3.11.
 """

@@ -7,7 +7,6 @@ r"""A driver for ROS 2 by rclpy. It has not been run with a robot: it is checked
 rclpy comes with ROS: start this where ROS is set up, and with its Python (docs/drivers/ros2.md). It only reads: it subscribes to
 topics and publishes none. Without frames and images it lists the frames of tf.
 
-    source /opt/ros/jazzy/setup.bash
     handeye driver test "handeye driver ros2"
     handeye driver ros2 \
         --base-frame base_link --tip-frame tool0 --image /camera/image_raw
