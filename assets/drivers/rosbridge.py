@@ -50,8 +50,6 @@ RESET_S = 1.0
 STALE_S = 2.0
 # Image and depth image of one exposure have stamps no further apart [s].
 ONE_INSTANT_S = 0.005
-# A joint slower than this is at rest [rad/s, or m/s].
-REST_SPEED = 1e-2
 # How far the norm of a quaternion of tf may be from 1: rounding to three digits is within, zeros of a field never set are not.
 UNIT_TOLERANCE = 1e-3
 # Bounds on untrusted input: frames, links of a chain, values of a stream, pieces of messages, sides of an image.
@@ -224,7 +222,6 @@ class Joints:
 
     def __init__(self, names):
         self.names, self.samples, self.seen = names, Samples(), []
-        self.moving = None  # where the newest message has speeds
 
     def take(self, message):
         """Takes a message. One that lacks a joint says nothing: another publisher has it."""
@@ -233,16 +230,6 @@ class Joints:
         found = [values.get(name) for name in self.names]
         if found and None not in found:
             self.samples.push(seconds(message), tuple(map(float, found)))
-            self.moving = moves(self.names, message)
-
-
-def moves(names, message):
-    """Whether one of these joints moves; None if the message lacks a speed: none at all, null, or the NaN of ros2_control."""
-    speeds = dict(zip(message["name"], message.get("velocity", ())))
-    speeds = [speeds.get(name) for name in names]
-    if None in speeds or any(math.isnan(speed) for speed in speeds):
-        return None
-    return any(abs(speed) > REST_SPEED for speed in speeds)
 
 
 def joints_of_urdf(path, base, tip):
@@ -741,7 +728,7 @@ class Rosbridge:
         joints = self.joints.samples.at(stamp, line) if self.options.joints else None
         if self.options.joints and joints is None:
             return
-        outlet.state(stamp, joints_rad=joints, base_from_tip=pose(translation, rotation), moving=self.joints.moving)
+        outlet.state(stamp, joints_rad=joints, base_from_tip=pose(translation, rotation))
         self.last_s, self.sent_s, self.is_stale = stamp, now, False
 
 

@@ -14,17 +14,15 @@ import json
 import math
 import os
 import pathlib
-import queue
 import struct
-import subprocess
 import sys
 import tempfile
 import threading
 import time
 import types
 
-# Longer than any driver waits by itself.
-PATIENCE_S = 20.0
+from driver_process import Ended, Talk
+
 RATE_HZ = 30
 WIDTH, HEIGHT = 320, 240
 # The lens of the colours; that of the depth, without distortion; and where the depth camera is in the colour camera [m].
@@ -102,78 +100,6 @@ def assert_aligned(data, lens):
 
 
 # ---------------------------------------------------------------------------------------------------------------- conversation
-
-
-class Ended(Exception):
-    """What the driver ended with, or did not send."""
-
-
-class Talk:
-    """The workbench's end of a driver."""
-
-    def __init__(self, command):
-        self.errors = tempfile.TemporaryFile()
-        # Whatever a library writes into the folder that it is started in is gone afterwards.
-        self.folder = tempfile.TemporaryDirectory()
-        self.process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.errors, cwd=self.folder.name
-        )
-        self.messages, self.logs, self.count = queue.Queue(), [], 0
-        threading.Thread(target=self.read, daemon=True).start()
-        self.say(type="hello", protocol=1, workbench="test")
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.process.kill()
-        self.process.wait()
-        self.written = os.listdir(self.folder.name)
-        self.folder.cleanup()
-
-    def say(self, **message):
-        self.process.stdin.write(json.dumps(message).encode() + b"\n")
-        self.process.stdin.flush()
-
-    def read(self):
-        while line := self.process.stdout.readline():
-            message = json.loads(line)
-            self.messages.put((message, self.process.stdout.read(message.get("bytes", 0))))
-        self.messages.put(None)
-
-    def wait(self, kind):
-        """The next message of a kind, and its bytes. Others are skipped, but for the driver's end."""
-        deadline = time.monotonic() + PATIENCE_S
-        while True:
-            try:
-                found = self.messages.get(timeout=max(deadline - time.monotonic(), 0.01))
-            except queue.Empty:
-                found = None
-            if found is None:
-                raise Ended(f"no {kind}: {self.said()[-2000:]}")
-            message, data = found
-            if message["type"] == kind:
-                return message, data
-            if message["type"] == "error":
-                raise Ended(message["text"])
-            if message["type"] == "log":
-                self.logs.append(message["text"])
-
-    def said(self):
-        """What the driver has logged: before its `hello` on standard error."""
-        self.errors.seek(0)
-        return "\n".join([*self.logs, self.errors.read().decode(errors="replace")])
-
-    def hello(self):
-        return self.wait("hello")[0]
-
-    def image(self, depth=False, after=None):
-        """An image with its bytes, and its depth with its bytes."""
-        self.count += 1
-        self.say(type="next_image", id=self.count, after=after, depth=depth)
-        image = self.wait("image")
-        assert image[0]["id"] == self.count, image[0]
-        return image, self.wait("depth") if depth else None
 
 
 def ending(talk):

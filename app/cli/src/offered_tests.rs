@@ -58,13 +58,13 @@ fn every_driver_that_comes_with_the_program_is_offered_with_every_option_it_has(
         };
         let options = file.map_or_else(|| of_clap(command), of_file);
         for (option, is_needed) in &options {
-            let field = offered.fields.iter().find(|field| field.option == option);
+            let field = offered.fields().find(|field| field.option == option);
             let is_always = offered.camera_alone.contains(&option.as_str());
             let is_left_out = NOT_OFFERED.contains(&(name, option.as_str()));
             assert!(field.is_some() || is_always || is_left_out, "{name}: no field for {option}");
             assert!(field.is_none_or(|field| *is_needed == (field.rank == Needed)), "{name}: {option}");
         }
-        for field in offered.fields {
+        for field in offered.fields() {
             assert!(options.iter().any(|(option, _)| option == field.option), "{name}: {} is none", field.option);
         }
     }

@@ -65,7 +65,9 @@ impl OpenCell {
                 if let CellSource::Drivers(drivers) = &source {
                     // Here, where its progress is visible and nothing waits for an answer.
                     for command in [&drivers.robot, &drivers.camera].into_iter().flatten() {
-                        python::prepare(command)?;
+                        if let Ok(spec) = command.parse() {
+                            python::prepare(&spec)?;
+                        }
                     }
                 }
                 source.cell(&paths)

@@ -31,7 +31,7 @@ pub fn run(args: &TestArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();
     let spec = spec(args).map_err(Failure::unusable)?;
     // Here, where its progress is visible: of a driver's output only errors are printed.
-    python::prepare(&spec.to_string())?;
+    python::prepare(&spec)?;
     let options = ConformanceOptions { allow_motion: args.allow_motion, ..ConformanceOptions::default() };
     let report = conformance::run(&spec, &options, &cancel).map_err(Failure::unusable)?;
     if let Some(output) = &args.json {

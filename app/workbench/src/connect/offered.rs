@@ -31,8 +31,8 @@ pub struct Offered {
     parts: &'static [Part],
     /// Arguments that it always gets as the driver of a camera only.
     pub camera_alone: &'static [&'static str],
-    /// What can be set for it.
-    pub fields: &'static [Field],
+    /// What can be set for it, in groups that drivers share.
+    fields: &'static [&'static [Field]],
 }
 
 /// Something that can be set for a driver.
@@ -82,15 +82,41 @@ use FieldKind::{Switch, Text, Word};
 use Rank::{More, Needed, Usual};
 
 /// For every driver that is a Python file: which Python to use, if it should not have an environment of its own.
-const PYTHON: Field = field("--python", Text("/usr/bin/python3"), More);
+const PYTHON: &[Field] = &[field("--python", Text("/usr/bin/python3"), More)];
+
+/// What is read of ROS, whatever it comes over.
+const ROS: &[Field] = &[
+    robot_field("--base-frame", Text("base_link"), Usual),
+    robot_field("--tip-frame", Text("tool0"), Usual),
+    field("--image", Text("/camera/image_raw"), Usual),
+    field("--camera-info", Text("/camera/camera_info"), Usual),
+    field("--rectified", Switch, More),
+    field("--depth", Text("/camera/depth"), More),
+    robot_field("--joints", Text("/joint_states"), More),
+    robot_field("--joint-names", Text("joint_1,joint_2,…"), More),
+    robot_field("--urdf", Text("robot.urdf"), More),
+    field("--image-rate", Text("10"), More),
+];
+
+/// What depth cameras have in common.
+const DEPTH_CAMERA: &[Field] = &[
+    field("--serial", Text("123456789012"), Usual),
+    field("--size", Text("1280x720"), Usual),
+    field("--exposure", Text("100"), Usual),
+    field("--gain", Text("16"), More),
+    field("--rate", Text("30"), More),
+    field("--no-depth", Switch, More),
+];
 
 /// What the cells of other simulators have in common.
-const SIDE: Field = robot_field("--eye-to-hand", Switch, Usual);
-const CELL_BOARD: Field = robot_field("--board", Text("10x7x15"), More);
-const CELL_SIZE: Field = robot_field("--size", Text("640x480"), More);
-const CELL_SAMPLES: Field = robot_field("--samples", Text("16"), More);
-const CELL_START: Field = robot_field("--start", Text("0,-80,-110,-80,90,0"), More);
-const CELL_TRUTH: Field = robot_field("--truth", Text("truth.json"), More);
+const SIMULATED_CELL: &[Field] = &[
+    robot_field("--eye-to-hand", Switch, Usual),
+    robot_field("--board", Text("10x7x15"), More),
+    robot_field("--size", Text("640x480"), More),
+    robot_field("--samples", Text("16"), More),
+    robot_field("--start", Text("0,-80,-110,-80,90,0"), More),
+    robot_field("--truth", Text("truth.json"), More),
+];
 
 /// All of them, in the order of the list.
 pub static ALL: &[Offered] = &[
@@ -99,9 +125,11 @@ pub static ALL: &[Offered] = &[
         parts: &[Part::Robot],
         camera_alone: &[],
         fields: &[
-            robot_field("--host", Text("192.168.0.10"), Needed),
-            robot_field("--arm", Word(|| ArmKind::ALL.into_iter().map(ArmKind::name).collect()), Usual),
-            robot_field("--frequency", Text("125"), More),
+            &[
+                robot_field("--host", Text("192.168.0.10"), Needed),
+                robot_field("--arm", Word(|| ArmKind::ALL.into_iter().map(ArmKind::name).collect()), Usual),
+                robot_field("--frequency", Text("125"), More),
+            ],
             PYTHON,
         ],
     },
@@ -110,9 +138,11 @@ pub static ALL: &[Offered] = &[
         parts: &[Part::Robot],
         camera_alone: &[],
         fields: &[
-            robot_field("--host", Text("192.168.1.185"), Needed),
-            robot_field("--urdf", Text("robot.urdf"), Usual),
-            robot_field("--tip-link", Text("link_eef"), More),
+            &[
+                robot_field("--host", Text("192.168.1.185"), Needed),
+                robot_field("--urdf", Text("robot.urdf"), Usual),
+                robot_field("--tip-link", Text("link_eef"), More),
+            ],
             PYTHON,
         ],
     },
@@ -121,10 +151,12 @@ pub static ALL: &[Offered] = &[
         parts: &[Part::Robot],
         camera_alone: &[],
         fields: &[
-            robot_field("--host", Text("172.16.0.2"), Needed),
-            robot_field("--urdf", Text("robot.urdf"), Usual),
-            robot_field("--tip-link", Text("fr3_link8"), More),
-            robot_field("--frequency", Text("100"), More),
+            &[
+                robot_field("--host", Text("172.16.0.2"), Needed),
+                robot_field("--urdf", Text("robot.urdf"), Usual),
+                robot_field("--tip-link", Text("fr3_link8"), More),
+                robot_field("--frequency", Text("100"), More),
+            ],
             PYTHON,
         ],
     },
@@ -133,100 +165,56 @@ pub static ALL: &[Offered] = &[
         parts: &[Part::Robot, Part::Camera],
         camera_alone: &[],
         fields: &[
-            field("--url", Text("ws://127.0.0.1:9090"), Usual),
-            robot_field("--base-frame", Text("base_link"), Usual),
-            robot_field("--tip-frame", Text("tool0"), Usual),
-            field("--image", Text("/camera/image_raw"), Usual),
-            field("--camera-info", Text("/camera/camera_info"), Usual),
-            field("--rectified", Switch, More),
-            field("--depth", Text("/camera/depth"), More),
-            robot_field("--joints", Text("/joint_states"), More),
-            robot_field("--joint-names", Text("joint_1,joint_2,…"), More),
-            robot_field("--urdf", Text("robot.urdf"), More),
-            field("--image-rate", Text("10"), More),
-            field("--fragment-size", Text("1000000"), More),
+            &[field("--url", Text("ws://127.0.0.1:9090"), Usual)],
+            ROS,
+            &[field("--fragment-size", Text("1000000"), More)],
             PYTHON,
         ],
     },
-    Offered {
-        name: "ros2",
-        parts: &[Part::Robot, Part::Camera],
-        camera_alone: &[],
-        fields: &[
-            robot_field("--base-frame", Text("base_link"), Usual),
-            robot_field("--tip-frame", Text("tool0"), Usual),
-            field("--image", Text("/camera/image_raw"), Usual),
-            field("--camera-info", Text("/camera/camera_info"), Usual),
-            field("--rectified", Switch, More),
-            field("--depth", Text("/camera/depth"), More),
-            robot_field("--joints", Text("/joint_states"), More),
-            robot_field("--joint-names", Text("joint_1,joint_2,…"), More),
-            robot_field("--urdf", Text("robot.urdf"), More),
-            field("--image-rate", Text("10"), More),
-            PYTHON,
-        ],
-    },
+    Offered { name: "ros2", parts: &[Part::Robot, Part::Camera], camera_alone: &[], fields: &[ROS, PYTHON] },
     #[cfg(target_os = "linux")]
     Offered {
         name: "v4l",
         parts: &[Part::Camera],
         camera_alone: &[],
         fields: &[
-            field("--device", Text("/dev/video0"), Usual),
-            field("--size", Text("1280x720"), Usual),
-            field("--format", Word(|| vec!["RGB3", "YUYV", "GREY", "MJPG"]), More),
-            field("--rate", Text("30"), More),
+            &[
+                field("--device", Text("/dev/video0"), Usual),
+                field("--size", Text("1280x720"), Usual),
+                field("--format", Word(|| vec!["RGB3", "YUYV", "GREY", "MJPG"]), More),
+                field("--rate", Text("30"), More),
+            ],
             PYTHON,
         ],
     },
-    Offered {
-        name: "realsense",
-        parts: &[Part::Camera],
-        camera_alone: &[],
-        fields: &[
-            field("--serial", Text("123456789012"), Usual),
-            field("--size", Text("1280x720"), Usual),
-            field("--exposure", Text("100"), Usual),
-            field("--gain", Text("16"), More),
-            field("--rate", Text("30"), More),
-            field("--no-depth", Switch, More),
-            PYTHON,
-        ],
-    },
+    Offered { name: "realsense", parts: &[Part::Camera], camera_alone: &[], fields: &[DEPTH_CAMERA, PYTHON] },
     Offered {
         name: "orbbec",
         parts: &[Part::Camera],
         camera_alone: &[],
-        fields: &[
-            field("--serial", Text("CP1234567890"), Usual),
-            field("--size", Text("1280x720"), Usual),
-            field("--exposure", Text("100"), Usual),
-            field("--gain", Text("16"), More),
-            field("--format", Word(|| vec!["YUYV", "MJPG", "RGB"]), More),
-            field("--rate", Text("30"), More),
-            field("--no-depth", Switch, More),
-            PYTHON,
-        ],
+        fields: &[DEPTH_CAMERA, &[field("--format", Word(|| vec!["YUYV", "MJPG", "RGB"]), More)], PYTHON],
     },
     Offered {
         name: "folder",
         parts: &[Part::Robot, Part::Camera],
         camera_alone: &["--images-only"],
         fields: &[
-            field("", Text("/home/me/captures"), Needed),
-            robot_field("--length-unit", Word(|| vec!["m", "mm"]), Usual),
-            robot_field(
-                "--rotation",
-                Word(|| vec!["quaternion_xyzw", "quaternion_wxyz", "rotation_vector", "rpy", "matrix"]),
-                Usual,
-            ),
-            robot_field("--angle-unit", Word(|| vec!["rad", "deg"]), Usual),
-            robot_field("--pose", Word(|| vec!["base_from_tip", "tip_from_base"]), Usual),
-            robot_field("--poses", Text("poses.csv"), More),
-            robot_field("--joints", Text("6"), More),
-            robot_field("--joint-unit", Word(|| vec!["rad", "deg"]), More),
-            field("--size", Text("1280x720"), More),
-            field("--hold", Text("2"), More),
+            &[
+                field("", Text("/home/me/captures"), Needed),
+                robot_field("--length-unit", Word(|| vec!["m", "mm"]), Usual),
+                robot_field(
+                    "--rotation",
+                    Word(|| vec!["quaternion_xyzw", "quaternion_wxyz", "rotation_vector", "rpy", "matrix"]),
+                    Usual,
+                ),
+                robot_field("--angle-unit", Word(|| vec!["rad", "deg"]), Usual),
+                robot_field("--pose", Word(|| vec!["base_from_tip", "tip_from_base"]), Usual),
+                robot_field("--poses", Text("poses.csv"), More),
+                robot_field("--joints", Text("6"), More),
+                robot_field("--joint-unit", Word(|| vec!["rad", "deg"]), More),
+                field("--size", Text("1280x720"), More),
+                field("--hold", Text("2"), More),
+            ],
             PYTHON,
         ],
     },
@@ -235,15 +223,12 @@ pub static ALL: &[Offered] = &[
         parts: &[Part::Robot],
         camera_alone: &[],
         fields: &[
-            SIDE,
-            robot_field("--model", Text("scene.xml"), Usual),
-            robot_field("--tip", Text("attachment_site"), Usual),
-            robot_field("--camera", Text("wrist"), More),
-            CELL_BOARD,
-            CELL_SIZE,
-            CELL_SAMPLES,
-            CELL_START,
-            CELL_TRUTH,
+            &[
+                robot_field("--model", Text("scene.xml"), Usual),
+                robot_field("--tip", Text("attachment_site"), Usual),
+                robot_field("--camera", Text("wrist"), More),
+            ],
+            SIMULATED_CELL,
             PYTHON,
         ],
     },
@@ -252,15 +237,12 @@ pub static ALL: &[Offered] = &[
         parts: &[Part::Robot],
         camera_alone: &[],
         fields: &[
-            robot_field("--arm", Word(|| vec!["panda", "iiwa", "xarm6"]), Usual),
-            SIDE,
-            robot_field("--urdf", Text("robot.urdf"), More),
-            robot_field("--tip", Text("tool0"), More),
-            CELL_BOARD,
-            CELL_SIZE,
-            CELL_SAMPLES,
-            CELL_START,
-            CELL_TRUTH,
+            &[
+                robot_field("--arm", Word(|| vec!["panda", "iiwa", "xarm6"]), Usual),
+                robot_field("--urdf", Text("robot.urdf"), More),
+                robot_field("--tip", Text("tool0"), More),
+            ],
+            SIMULATED_CELL,
             PYTHON,
         ],
     },
@@ -268,14 +250,14 @@ pub static ALL: &[Offered] = &[
         name: "fake",
         parts: &[Part::Robot],
         camera_alone: &[],
-        fields: &[
+        fields: &[&[
             robot_field("--scene", Word(|| ShippedScene::ALL.into_iter().map(ShippedScene::name).collect()), Usual),
             robot_field("--seed", Text("1"), Usual),
             robot_field("--arm-errors", Word(|| ArmErrorsChoice::NAMES.to_vec()), More),
             robot_field("--connect", Text("tcp://127.0.0.1:23000"), More),
             robot_field("--only", Word(|| vec!["robot", "camera"]), More),
             robot_field("--clock", Text("0"), More),
-        ],
+        ]],
     },
 ];
 
@@ -325,9 +307,14 @@ const PROGRAM: &str = "handeye";
 pub const ON: &str = "on";
 
 impl Offered {
+    /// All that can be set for it.
+    pub fn fields(&self) -> impl Iterator<Item = &'static Field> {
+        self.fields.iter().copied().flatten()
+    }
+
     /// The fields for a part of the cell.
     pub fn fields_of(&self, part: Part) -> impl Iterator<Item = &'static Field> {
-        self.fields.iter().filter(move |field| part == Part::Robot || field.for_camera)
+        self.fields().filter(move |field| part == Part::Robot || field.for_camera)
     }
 
     fn always(&self, part: Part) -> &'static [&'static str] {

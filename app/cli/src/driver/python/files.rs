@@ -1,5 +1,6 @@
 //! The files of the drivers, embedded in the program, and where they are written to be run.
 
+use std::collections::BTreeMap;
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash as _, Hasher as _};
 use std::path::{Path, PathBuf};
@@ -76,17 +77,16 @@ pub fn cache() -> Result<PathBuf, EnvironmentError> {
 /// Writes the files of the drivers unless they exist. Each version of them has a folder of its own, so that one does not
 /// change what another runs.
 pub fn written() -> Result<PathBuf, EnvironmentError> {
+    let files: BTreeMap<&str, &str> = ALL.iter().flat_map(Shipped::files).collect();
     let mut hasher = DefaultHasher::new();
-    for (_, source) in ALL.iter().flat_map(Shipped::files) {
-        source.hash(&mut hasher);
-    }
+    files.hash(&mut hasher);
     let folder = cache()?.join(format!("files-{:016x}", hasher.finish()));
     let failed = |path: &Path, error: &std::io::Error| EnvironmentError::NotWritten {
         path: path.to_path_buf(),
         why: error.to_string(),
     };
     std::fs::create_dir_all(&folder).map_err(|error| failed(&folder, &error))?;
-    for (file, source) in ALL.iter().flat_map(Shipped::files) {
+    for (file, source) in files {
         let path = folder.join(file);
         if std::fs::read(&path).is_ok_and(|bytes| bytes == source.as_bytes()) {
             continue;

@@ -66,8 +66,8 @@ fn audience() -> Audience {
 }
 
 /// Creates the environment of one of these drivers, if a command line starts one that has none yet.
-pub fn prepare(command: &str) -> Result<(), Failure> {
-    let Ok(DriverSpec::Command(words)) = command.parse() else { return Ok(()) };
+pub fn prepare(spec: &DriverSpec) -> Result<(), Failure> {
+    let DriverSpec::Command(words) = spec else { return Ok(()) };
     let [_, command, name, options @ ..] = words.as_slice() else { return Ok(()) };
     let Some(driver) = files::ALL.iter().find(|driver| command == "driver" && driver.name == name) else {
         return Ok(());

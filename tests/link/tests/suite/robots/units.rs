@@ -27,7 +27,7 @@ fn drivers_of_arms_read_what_their_controllers_state() {
     passes("robot_drivers.py", &["assets/drivers"]);
 }
 
-/// Software devices of librealsense, and a stand-in for Orbbec's SDK.
+/// Software devices of librealsense, and recordings that Orbbec's SDK plays, where it is installed.
 #[test]
 fn drivers_of_cameras_read_what_their_libraries_give() {
     passes("camera_drivers.py", &["assets/drivers"]);
